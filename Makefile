@@ -1,0 +1,39 @@
+# The project's commands: quickstart, test, bench; each makes .venv first.
+PYTHON ?= $(shell command -v python3.11 || command -v python3)
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+
+.PHONY: quickstart test lint bench hooks clean help
+help:            ## list the commands
+	@grep -E '^[a-z]+: .*##' $(MAKEFILE_LIST) | sed 's/:.*##/ -/'
+
+$(STAMP): pyproject.toml constraints.txt
+	$(PYTHON) -m venv $(VENV)
+	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --progress-bar off -e '.[dev]'
+	touch $(STAMP)
+
+quickstart: $(STAMP) ## from two settled beds to a trained, exported, running closure
+	$(BIN)/greybed quickstart --out runs/quickstart
+
+test: $(STAMP)   ## lint, types, import contracts, tests
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/pytest -n 2 --dist worksteal --durations=10
+
+lint: $(STAMP)   ## mend what can be mended, show the rest
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(STAMP)  ## benchmarks against peers; not part of the tests
+	$(BIN)/python benchmarks/raytrace.py
+
+hooks: $(STAMP)  ## install the pre-commit hooks
+	$(BIN)/pre-commit install
+
+clean:           ## remove what the commands above made
+	rm -rf $(VENV) runs build dist *.egg-info

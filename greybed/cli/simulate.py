@@ -1,0 +1,103 @@
+"""Run a coupled case from a TOML file: temperatures of a bed of spheres between hot and cold walls.
+
+Writes temperatures.csv, bed.vtu (for ParaView) and summary.json; a transient case also history.csv.
+
+example: greybed simulate examples/heated_bed/case.toml --out runs/heated_bed
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from greybed.core.errors import InputError
+from greybed.core.files import atomic_path, output_folder, write_summary
+from greybed.core.packing import Packing
+from greybed.core.progress import progress
+
+TICKS = 1000  # of a progress bar that counts a fraction
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of ``greybed simulate``."""
+    parser.add_argument("case", type=Path, help='case file (TOML, kind = "thermal-bed")')
+    parser.add_argument("--out", type=Path, required=True, help="folder for the results")
+    parser.add_argument("--threads", type=int, help="threads for the ray tracer (default: all)")
+    parser.add_argument("--quiet", action="store_true", help="no progress bars")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the case that ``options`` names; returns 0."""
+    # Loaded here so that --help answers at once.
+    from greybed.core.readers import read_packing
+    from greybed.core.writers import write_packing
+    from greybed.coupling.case import load_case, run_case, summary, view_factors
+
+    if options.threads is not None and options.threads < 1:
+        raise InputError(
+            f"--threads = {options.threads} [-] must be at least 1; leave it out for all."
+        )
+    case = load_case(options.case)
+    folder = output_folder(options.out)
+    packing = read_packing(case.packing.file, walls=case.walls)
+    show = not options.quiet
+    rows = view_factors(case, packing, threads=options.threads, show=show)
+    transient = case.solve.mode == "transient"
+    with progress(TICKS, "heating", show=show and transient) as advance:
+        done = 0.0
+
+        def on_progress(fraction: float) -> None:
+            nonlocal done
+            before, done = done, done + fraction
+            advance(round(done * TICKS) - round(before * TICKS))
+
+        bed, result = run_case(case, packing, rows, on_progress=on_progress)
+
+    inputs = [options.case, case.packing.file]
+    if case.radiation.closure is not None:
+        inputs.append(case.radiation.closure)
+    _write_temperatures(folder / "temperatures.csv", packing, result.temperatures)
+    write_packing(packing, folder / "bed.vtu", fields={"temperature [K]": result.temperatures})
+    if transient:
+        names = [w.name for w in case.wall]
+        _write_history(folder / "history.csv", result.history, names)
+    results = summary(case, bed, result)
+    write_summary(folder, "simulate", results, *inputs, seed=case.radiation.seed)
+
+    print(f"{len(packing)} spheres, {results['status']}")
+    t = result.temperatures
+    print(
+        f"temperature {t.min():.2f} to {t.max():.2f} K, mean {results['mean_temperature_K']:.2f} K"
+    )
+    for name, flow in results["heat_into_bed"].items():
+        parts = ", ".join(f"{key[:-2]} {value:.5g} W" for key, value in flow.items())
+        print(f"heat from {name}: {parts}")
+    if case.opening is not None and rows is not None and results["opening_view_factor"] == 0.0:
+        print(
+            "note: no sphere sees the opening, because walls are unbounded (a cylinder closes its "
+            "own top); for an open top add a plane with the temperature of the surroundings"
+        )
+    if len(result.isolated):
+        print(f"{len(result.isolated)} spheres have no path to a temperature (see summary.json)")
+    print(f"results in {folder}")
+    return 0
+
+
+def _write_temperatures(path: Path, packing: Packing, temperatures: np.ndarray) -> None:
+    table = np.column_stack([packing.centres, packing.radii, temperatures])
+    with atomic_path(path) as temporary, open(temporary, "w") as stream:
+        stream.write("x [m],y [m],z [m],radius [m],temperature [K]\n")
+        np.savetxt(stream, table, delimiter=",", fmt="%.9g")
+
+
+def _write_history(path: Path, history: dict[str, np.ndarray], walls: list[str]) -> None:
+    names = ("time", "mean", "lowest", "highest", "opening_heat", "stored", "supplied")
+    units = ("s", "K", "K", "K", "W", "J", "J")
+    header = [f"{name} [{unit}]" for name, unit in zip(names, units, strict=True)]
+    header += [f"heat of {name} [W]" for name in walls]
+    table = np.column_stack([*(history[name] for name in names), history["wall_heat"]])
+    with atomic_path(path) as temporary, open(temporary, "w") as stream:
+        stream.write(",".join(header) + "\n")
+        np.savetxt(stream, table, delimiter=",", fmt="%.9g")

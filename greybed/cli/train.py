@@ -1,0 +1,88 @@
+"""Train a closure from a data set and score it on packings that it has not seen.
+
+Example:
+  greybed train viewfactor runs/viewfactor.h5 --model mlp --out runs
+
+Writes NAME.closure (one file: weights, markers, ranges, golden rows) and summary.json. The
+exit code is 1 if a limiting case fails.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of ``greybed train``."""
+    parser.add_argument("quantity", choices=("viewfactor",), help="what the closure gives")
+    parser.add_argument("data", help="data set from greybed dataset")
+    parser.add_argument("--model", choices=("mlp", "forest"), default="mlp", help="default: mlp")
+    parser.add_argument(
+        "--markers",
+        choices=("pencil", "published"),
+        default="pencil",
+        help="pencil: real blockers on a pencil of lines; published: r_j/d, spheres between, "
+        "r_j/r_i, solid fraction (default: pencil)",
+    )
+    parser.add_argument("--seed", type=int, default=0, metavar="S", help="default: 0")
+    parser.add_argument("--epochs", type=int, default=40, metavar="N", help="default: 40")
+    parser.add_argument("--name", help="name of the file (default: viewfactor_MODEL_MARKERS)")
+    parser.add_argument("--out", required=True, metavar="DIR", help="folder to write into")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Train, check the limits, write the artifact."""
+    from greybed.closures import content_hash, save
+    from greybed.closures.artifact import SUFFIX
+    from greybed.closures.viewfactor.limits import check_limits
+    from greybed.core import InputError
+    from greybed.core.files import output_folder, writable_file, write_summary
+    from greybed.datasets.viewfactor import read
+    from greybed.training import train
+
+    if options.epochs < 1:
+        raise InputError(f"--epochs = {options.epochs} must be at least 1.")
+    name = f"viewfactor_{options.model}_{options.markers}"
+    name = name if options.name is None else options.name
+    if not name.strip(". ") or Path(name).name != name:
+        raise InputError(f"--name = {name!r} is no file name; give one without folders.")
+    data = read(options.data)
+    # Before the work: a name that is too long, or taken by a folder.
+    target = writable_file(output_folder(options.out) / (name + SUFFIX))
+    begin = time.perf_counter()
+    try:
+        closure = train(
+            data, options.model, options.markers, seed=options.seed, epochs=options.epochs,
+            show_progress=True,
+        )  # fmt: skip
+    except InputError as error:
+        raise InputError(f"{options.data}: {error}") from None
+    seconds = time.perf_counter() - begin
+    path = save(closure, target)
+    cases = check_limits(closure)
+    score = closure.card["score"]
+    write_summary(
+        target.parent,
+        "train viewfactor",
+        {
+            "file": path.name,
+            "hash": content_hash(closure),
+            "score": score,
+            "limits": {case.name: case.passed for case in cases},
+            "seconds": seconds,
+        },
+        options.data,
+        seed=options.seed,
+    )
+    low, high = score["r2_ci95"]
+    print(
+        f"{path}: R2 = {score['r2']:.5f} (95 %: {low:.5f} to {high:.5f}), RMSE = "
+        f"{score['rmse']:.2e} over {score['pairs']} pairs of {score['packings']} unseen packings"
+    )
+    failed = [case.name for case in cases if not case.passed]
+    for name_ in failed:
+        print(f"limiting case fails: {name_}")
+    print(f"next: greybed check {path}")
+    return 1 if failed else 0

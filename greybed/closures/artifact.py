@@ -1,0 +1,173 @@
+"""One file per closure: weights, markers, ranges, card, golden rows; sealed by a hash, no pickle.
+
+Layout: a magic line, the SHA-256 of everything after it, then an ``.npz`` archive whose member
+``manifest`` is JSON. Loading checks the hash, reads arrays only, and replays the golden rows.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+import stat
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from greybed._version import __version__
+from greybed.closures.predictors import PREDICTORS
+from greybed.closures.viewfactor.closure import Domain, ViewFactorClosure
+from greybed.closures.viewfactor.limits import random_markers
+from greybed.closures.viewfactor.visibility import MARKER_SETS
+from greybed.core import InputError, VerificationError
+from greybed.core.files import atomic_path
+
+MAGIC = b"greybed closure 1\n"
+GOLDEN_ROWS = 64
+# The same arithmetic in the same order: only the last digits of libm may differ.
+GOLDEN_TOLERANCE = 1e-12
+SUFFIX = ".closure"
+
+
+def golden_rows(closure: ViewFactorClosure) -> tuple[NDArray, NDArray]:
+    """Inputs (64, n_markers) and outputs (64, 2: factor, standard error) to replay anywhere."""
+    markers = random_markers(closure, GOLDEN_ROWS, seed=20)
+    # Every third row free of obstruction, so that the gate's exact zero is replayed too.
+    for marker in closure.markers.markers:
+        if marker.free is not None:
+            markers[marker.name][::3] = marker.free
+    prediction = closure.predict(**markers)
+    inputs = np.stack([markers[name] for name in closure.marker_names], axis=1)
+    return inputs, np.stack([prediction.view_factor, prediction.stderr], axis=1)
+
+
+def content_hash(closure: ViewFactorClosure) -> str:
+    """SHA-256 over the arrays that decide what a closure answers: the same in every export."""
+    digest = hashlib.sha256(f"{closure.quantity} {closure.markers.name} {closure.kind}".encode())
+    arrays = {**closure.predictor.arrays(), **closure.domain.arrays()}
+    for name, array in sorted(arrays.items()):
+        digest.update(name.encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def save(closure: ViewFactorClosure, path: str | os.PathLike[str]) -> Path:
+    """Write a closure to one file, whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    inputs, outputs = golden_rows(closure)
+    manifest = {
+        "quantity": closure.quantity,
+        "kind": closure.kind,
+        "markers": closure.markers.name,
+        "marker_names": closure.marker_names,
+        "marker_meanings": [m.meaning for m in closure.markers.markers],
+        "feature_names": closure.markers.feature_names,
+        "hash": content_hash(closure),
+        "greybed": __version__,
+        "card": closure.card,
+    }
+    arrays = {
+        **{f"predictor_{k}": v for k, v in closure.predictor.arrays().items()},
+        **closure.domain.arrays(),
+        "golden_inputs": inputs,
+        "golden_outputs": outputs,
+        "manifest": np.frombuffer(json.dumps(manifest).encode(), dtype=np.uint8),
+    }
+    buffer = io.BytesIO()
+    # savez accepts names as keywords; its stubs also reserve allow_pickle
+    np.savez_compressed(buffer, **arrays)  # type: ignore[arg-type]
+    payload = buffer.getvalue()
+    seal = hashlib.sha256(payload).hexdigest().encode() + b"\n"
+    target = Path(path)
+    with atomic_path(target) as temporary:
+        temporary.write_bytes(MAGIC + seal + payload)
+    return target
+
+
+def load(path: str | os.PathLike[str]) -> ViewFactorClosure:
+    """Read a closure and replay its golden rows.
+
+    Parameters
+    ----------
+    path : path
+        A ``.closure`` file.
+
+    Returns
+    -------
+    ViewFactorClosure
+        Ready to evaluate; needs neither torch nor scikit-learn.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, not an artifact, truncated or changed.
+    VerificationError
+        If a golden row does not come out as it was stored.
+    """
+    file = Path(path)
+    arrays, manifest = _unpack(file)
+    try:
+        predictor = PREDICTORS[manifest["kind"]].from_arrays(
+            {k.removeprefix("predictor_"): v for k, v in arrays.items() if k[:10] == "predictor_"}
+        )
+        closure = ViewFactorClosure(
+            MARKER_SETS[manifest["markers"]], predictor, Domain.from_arrays(arrays),
+            manifest["card"],
+        )  # fmt: skip
+        inputs, expected = arrays["golden_inputs"], arrays["golden_outputs"]
+    except (KeyError, IndexError, ValueError) as error:
+        raise InputError(
+            f"{file}: the artifact lacks or mistakes {error}; it was written by greybed "
+            f"{manifest.get('greybed', 'unknown')}, this is {__version__}: train it again."
+        ) from None
+    columns = dict(zip(closure.marker_names, inputs.T, strict=True))
+    prediction = closure.predict(**columns)
+    replayed = np.stack([prediction.view_factor, prediction.stderr], axis=1)
+    error_ = np.abs(replayed - expected) / np.maximum(np.abs(expected), 1e-300)
+    if not (error_ <= GOLDEN_TOLERANCE).all():
+        row = int(np.nan_to_num(error_, nan=np.inf).max(axis=1).argmax())
+        raise VerificationError(
+            f"{file}: golden row {row} gives {replayed[row, 0]:.17g} instead of "
+            f"{expected[row, 0]:.17g} [-], beyond {GOLDEN_TOLERANCE:g}; this installation "
+            "computes differently: reinstall numpy, or train the closure again."
+        )
+    return closure
+
+
+def _unpack(file: Path) -> tuple[dict[str, NDArray], dict[str, Any]]:
+    try:
+        if not stat.S_ISREG(file.stat().st_mode):  # a device may never end
+            raise InputError(f"{file}: this is a folder or a device; give a {SUFFIX} file.")
+        content = file.read_bytes()
+    except OSError as error:
+        raise InputError(
+            f"{file}: cannot read this artifact ({error.strerror}); check the path."
+        ) from None
+    if not content.startswith(MAGIC):
+        raise InputError(
+            f"{file}: not a closure artifact (it does not begin with {MAGIC.decode().strip()!r}); "
+            "make one with greybed train."
+        )
+    seal, _, payload = content[len(MAGIC) :].partition(b"\n")
+    if hashlib.sha256(payload).hexdigest().encode() != seal:
+        raise InputError(
+            f"{file}: the artifact is truncated or changed (its SHA-256 does not match); "
+            "copy it again or train it again."
+        )
+    try:
+        with np.load(io.BytesIO(payload), allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+        manifest = json.loads(arrays.pop("manifest").tobytes())
+    except (KeyError, ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError(f"{file}: the artifact cannot be unpacked ({error}); train it again.") \
+            from None  # fmt: skip
+    return arrays, manifest

@@ -1,0 +1,175 @@
+"""Two-headed predictors without torch or scikit-learn: a small network, a forest in arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from greybed.closures import _kernels
+from greybed.core import InputError
+
+Array = NDArray[np.float64]
+
+# Rows of one matrix product: too few for BLAS to share them out over threads, whose number would
+# change the last bits; and they stay in cache, which makes up for it.
+BLOCK = 256
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """Fully connected network with tanh between the layers and two outputs (value, spread).
+
+    Attributes
+    ----------
+    mean, scale : (n_features,) float
+        Features are shifted by ``mean`` and divided by ``scale`` first.
+    weights : arrays of shape (n_in, n_out)
+        One for each layer.
+    biases : arrays of shape (n_out,)
+        One for each layer.
+    """
+
+    kind: ClassVar[str] = "mlp"
+    mean: Array
+    scale: Array
+    weights: tuple[Array, ...]
+    biases: tuple[Array, ...]
+
+    def __call__(self, features: Array) -> Array:
+        """Outputs (m, 2) of features (m, n_features)."""
+        out = np.empty((len(features), self.biases[-1].size))
+        for first in range(0, len(features), BLOCK):
+            some = slice(first, first + BLOCK)
+            out[some] = self._outputs(features[some])
+        return out
+
+    def _outputs(self, features: Array) -> Array:
+        x = (features - self.mean) / self.scale
+        for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
+            x = x @ weight + bias
+            if k + 1 < len(self.weights):
+                x = np.tanh(x)
+        return x
+
+    def arrays(self) -> dict[str, NDArray]:
+        """Arrays to store, by name."""
+        layers = {f"weight_{k}": w for k, w in enumerate(self.weights)}
+        return {
+            "mean": self.mean,
+            "scale": self.scale,
+            **layers,
+            **{f"bias_{k}": b for k, b in enumerate(self.biases)},
+        }
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, NDArray]) -> Network:
+        """Rebuild from :meth:`arrays`."""
+        n = sum(name.startswith("weight_") for name in arrays)
+        return cls(
+            arrays["mean"],
+            arrays["scale"],
+            tuple(arrays[f"weight_{k}"] for k in range(n)),
+            tuple(arrays[f"bias_{k}"] for k in range(n)),
+        )
+
+    @classmethod
+    def random(cls, n_features: int, hidden: tuple[int, ...] = (24, 24), seed: int = 0) -> Network:
+        """Untrained network with Glorot weights."""
+        rng = np.random.default_rng(seed)
+        sizes = (n_features, *hidden, 2)
+        weights, biases = [], []
+        for n_in, n_out in pairwise(sizes):
+            limit = np.sqrt(6.0 / (n_in + n_out))
+            weights.append(rng.uniform(-limit, limit, (n_in, n_out)))
+            biases.append(np.zeros(n_out))
+        return cls(np.zeros(n_features), np.ones(n_features), tuple(weights), tuple(biases))
+
+
+@dataclass(frozen=True, eq=False)
+class Forest:
+    """Forest in flat arrays; features are compared in single precision, as scikit-learn does.
+
+    Attributes
+    ----------
+    roots : (n_trees,) int32
+        First node of each tree.
+    feature : (n_nodes,) int32
+        Feature to compare, -1 at a leaf.
+    threshold : (n_nodes,) float32
+        Left where the feature is at most this.
+    left : (n_nodes,) int32
+        Left child; the right one follows it.
+    value : (n_nodes, 2) float64
+        Leaf values (value, spread).
+    """
+
+    kind: ClassVar[str] = "forest"
+    roots: NDArray[np.int32]
+    feature: NDArray[np.int32]
+    threshold: NDArray[np.float32]
+    left: NDArray[np.int32]
+    value: Array
+
+    def __post_init__(self) -> None:
+        nodes = len(self.feature)
+        inner = self.feature >= 0
+        # A file must not be able to send the walk out of bounds or round in circles.
+        sound = (
+            len(self.threshold) == len(self.left) == len(self.value) == nodes
+            and self.value.shape[1:] == (2,)
+            and len(self.roots) > 0
+            and ((self.roots >= 0) & (self.roots < nodes)).all()
+            and (self.left[inner] > np.flatnonzero(inner)).all()
+            and (self.left[inner] + 1 < nodes).all()
+        )
+        if not sound:
+            raise InputError("the forest's arrays do not form trees; train or copy it again.")
+
+    def __call__(self, features: Array) -> Array:
+        """Outputs (m, 2) of features (m, n_features)."""
+        out = np.empty((len(features), 2))
+        single = np.ascontiguousarray(features, dtype=np.float32)
+        _kernels.walk_trees(
+            single, self.roots, self.feature, self.threshold, self.left, self.value, out
+        )
+        return out
+
+    def arrays(self) -> dict[str, NDArray]:
+        """Arrays to store, by name."""
+        return {
+            "roots": self.roots,
+            "feature": self.feature,
+            "threshold": self.threshold,
+            "left": self.left,
+            "value": self.value,
+        }
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, NDArray]) -> Forest:
+        """Rebuild from :meth:`arrays`."""
+        names = ("roots", "feature", "threshold", "left", "value")
+        return cls(*(arrays[name] for name in names))
+
+    @classmethod
+    def random(cls, n_features: int, trees: int = 8, seed: int = 0) -> Forest:
+        """Untrained forest: trees of depth three with random splits and leaves in (0, 1)."""
+        rng = np.random.default_rng(seed)
+        nodes = 15
+        inner = np.arange(nodes) < 7
+        feature = np.where(inner, rng.integers(0, n_features, (trees, nodes)), -1)
+        left = np.where(inner, 2 * np.arange(nodes) + 1, 0) + nodes * np.arange(trees)[:, None]
+        return cls(
+            (nodes * np.arange(trees)).astype(np.int32),
+            feature.ravel().astype(np.int32),
+            rng.uniform(0.0, 1.0, trees * nodes).astype(np.float32),
+            left.ravel().astype(np.int32),
+            rng.uniform(0.01, 0.99, (trees * nodes, 2)),
+        )
+
+
+Predictor = Network | Forest
+PREDICTORS: dict[str, type[Network] | type[Forest]] = {"mlp": Network, "forest": Forest}

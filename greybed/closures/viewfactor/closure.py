@@ -1,0 +1,239 @@
+"""View-factor closure: exact pair factor times a learnt visibility, with its own uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from greybed.closures.predictors import PREDICTORS, Predictor
+from greybed.closures.viewfactor.exact import TOUCHING, pair_factor
+from greybed.closures.viewfactor.visibility import (
+    MARKER_SETS,
+    MarkerSet,
+    spread,
+    unblocked_share,
+)
+from greybed.core import Packing, RangeError
+
+if TYPE_CHECKING:
+    from greybed.closures.viewfactor.bed import BedFactors
+
+Array = NDArray[np.float64]
+
+
+class Prediction(NamedTuple):
+    """What a closure says of each pair.
+
+    Attributes
+    ----------
+    view_factor : ndarray
+        F_ij [-].
+    stderr : ndarray
+        The closure's own standard error [-]; zero where nothing stands between.
+    extrapolates : ndarray of bool
+        Whether the markers lie outside the training data. Never where nothing stands between:
+        the exact law holds there.
+    """
+
+    view_factor: Array
+    stderr: Array
+    extrapolates: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Domain:
+    """Where the training data lie, in features.
+
+    Attributes
+    ----------
+    low, high : (n_features,) float
+        Range of each feature.
+    centre : (n_features,) float
+        Their mean.
+    precision : (n_features, n_features) float
+        Inverse covariance.
+    limit : float
+        Largest Mahalanobis distance that counts as inside [-].
+    """
+
+    low: Array
+    high: Array
+    centre: Array
+    precision: Array
+    limit: float
+
+    @classmethod
+    def everywhere(cls, n_features: int) -> Domain:
+        """The domain of an untrained closure: nothing is outside."""
+        infinite = np.full(n_features, np.inf)
+        zeros = np.zeros(n_features)
+        return cls(-infinite, infinite, zeros, np.zeros((n_features, n_features)), np.inf)
+
+    @classmethod
+    def of(cls, features: Array) -> Domain:
+        """The domain that holds these features (m, n_features)."""
+        centre = features.mean(axis=0)
+        spread_ = np.cov(features.T) + 1e-12 * np.eye(features.shape[1])
+        precision = np.asarray(np.linalg.inv(spread_), dtype=np.float64)
+        away = features - centre
+        distance2 = np.einsum("ij,jk,ik->i", away, precision, away)
+        limit = float(np.sqrt(np.quantile(distance2, 0.9999)))
+        return cls(
+            features.min(axis=0),
+            features.max(axis=0),
+            centre,
+            precision,
+            limit,
+        )
+
+    def outside(self, features: Array) -> NDArray[np.bool_]:
+        """Whether each of the features (m, n_features) lies outside."""
+        box = ((features < self.low) | (features > self.high)).any(axis=-1)
+        away = features - self.centre
+        distance2 = np.einsum("ij,jk,ik->i", away, self.precision, away)
+        return box | (distance2 > self.limit**2)
+
+    def arrays(self) -> dict[str, NDArray]:
+        """Arrays to store, by name."""
+        return {
+            "domain_low": self.low,
+            "domain_high": self.high,
+            "domain_centre": self.centre,
+            "domain_precision": self.precision,
+            "domain_limit": np.array([self.limit]),
+        }
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, NDArray]) -> Domain:
+        """Rebuild from :meth:`arrays`."""
+        low, high, centre, precision, limit = (
+            arrays[f"domain_{name}"] for name in ("low", "high", "centre", "precision", "limit")
+        )
+        return cls(low, high, centre, precision, float(limit[0]))
+
+
+@dataclass(frozen=True, eq=False)
+class ViewFactorClosure:
+    """F_ij = F_exact(r_i, r_j, d) V with V = 1 - gate (1 - v), v learnt.
+
+    Parameters
+    ----------
+    markers : MarkerSet
+        Which markers, and their gate, baseline and features.
+    predictor : Network or Forest
+        The learnt part.
+    domain : Domain
+        Where it was trained.
+    card : dict
+        Plain facts about the closure: data-set hash, scores, versions.
+    """
+
+    markers: MarkerSet
+    predictor: Predictor
+    domain: Domain
+    card: dict[str, Any] = field(default_factory=dict)
+
+    quantity = "viewfactor"
+
+    @classmethod
+    def untrained(
+        cls, kind: str = "mlp", markers: str = "pencil", seed: int = 0
+    ) -> ViewFactorClosure:
+        """A closure with random weights: useless factors, but every limit already holds."""
+        marker_set = MARKER_SETS[markers]
+        n = len(marker_set.feature_names)
+        predictor = PREDICTORS[kind].random(n, seed=seed)
+        return cls(marker_set, predictor, Domain.everywhere(n))
+
+    @property
+    def kind(self) -> str:
+        """``mlp`` or ``forest``."""
+        return self.predictor.kind
+
+    @property
+    def marker_names(self) -> tuple[str, ...]:
+        """Names of the markers that :meth:`evaluate` takes."""
+        return self.markers.names
+
+    def evaluate(self, **markers: ArrayLike) -> Array:
+        """View factors from i to j.
+
+        Parameters
+        ----------
+        **markers : array_like
+            The markers by name (see :attr:`marker_names`), broadcast against each other [-].
+            ``radius_over_distance`` is r_j / d and ``radius_ratio`` r_j / r_i.
+
+        Returns
+        -------
+        factor : ndarray
+            F_ij [-], above 0 and at most the exact unobstructed factor.
+
+        Raises
+        ------
+        RangeError
+            If a marker is missing, unknown, not finite or outside its range, or the spheres
+            overlap by more than soft contact does.
+        """
+        return self.predict(**markers).view_factor
+
+    def predict(self, **markers: ArrayLike) -> Prediction:
+        """View factors with the closure's own standard error and a flag for extrapolation.
+
+        Takes the markers of :meth:`evaluate`.
+        """
+        m = self._checked(markers)
+        shape = next(iter(m.values())).shape
+        flat = {name: np.ravel(value) for name, value in m.items()}
+        features = self.markers.features(flat)
+        gate = self.markers.gate(flat)
+        raw = self.predictor(features)
+        share = unblocked_share(self.kind, self.markers.baseline(flat), raw[:, 0])
+        exact = pair_factor(flat["radius_over_distance"], flat["radius_ratio"])
+        # A sum of two positive parts: 1 - gate (1 - share) would cancel where little is visible,
+        # and with it reciprocity.
+        factor = exact * ((1.0 - gate) + gate * share)
+        error = exact * gate * spread(self.kind, raw[:, 1])
+        outside = self.domain.outside(features) & (gate > 0.0)
+        return Prediction(factor.reshape(shape), error.reshape(shape), outside.reshape(shape))
+
+    def bed_factors(self, packing: Packing, **options: Any) -> BedFactors:
+        """View factors of a whole bed; see :func:`greybed.closures.viewfactor.bed.bed_factors`."""
+        from greybed.closures.viewfactor.bed import bed_factors
+
+        return bed_factors(self, packing, **options)
+
+    def _checked(self, markers: dict[str, ArrayLike]) -> dict[str, Array]:
+        wanted, given = set(self.marker_names), set(markers)
+        if wanted != given:
+            raise RangeError(
+                f"this closure takes the markers {', '.join(self.marker_names)}; "
+                f"missing: {', '.join(sorted(wanted - given)) or 'none'}, "
+                f"unknown: {', '.join(sorted(given - wanted)) or 'none'}."
+            )
+        arrays = [np.asarray(markers[name], dtype=np.float64) for name in self.marker_names]
+        m = dict(zip(self.marker_names, np.broadcast_arrays(*arrays), strict=True))
+        for marker in self.markers.markers:
+            value = m[marker.name]
+            bad = ~np.isfinite(value) | (value > marker.high)
+            bad |= (value <= marker.low) if marker.low_open else (value < marker.low)
+            if bad.any():
+                at = np.unravel_index(int(bad.argmax()), bad.shape)
+                place = f"[{', '.join(map(str, at))}]" if at else ""
+                raise RangeError(
+                    f"{marker.name}{place} = {value[at]:g} [-] ({marker.meaning}) must lie in "
+                    f"{'(' if marker.low_open else '['}{marker.low:g}, {marker.high:g}]; "
+                    "check how the markers were made."
+                )
+        x = m["radius_over_distance"]
+        reach = x * (1.0 + 1.0 / m["radius_ratio"])
+        deep = reach > 1.0 / (1.0 - TOUCHING)
+        if deep.any():
+            raise RangeError(
+                f"(r_i + r_j) / d = {reach[deep].flat[0]:.4g} [-] exceeds 1 by more than soft "
+                f"contact does ({TOUCHING:.0%}): the spheres overlap; separate them."
+            )
+        return m

@@ -1,0 +1,162 @@
+r"""Visibility V in (0, 1]: gate, baseline and bounded correction for each set of markers.
+
+.. math:: F_{ij} = F_\mathrm{exact}\,V,\qquad V = 1 - g\,(1 - v),\qquad v \in (0, 1)
+
+The gate g is exactly zero where nothing stands between the spheres, so V = 1 there whatever the
+predictor says. A network bends a baseline v0 by bounded odds, v = v0 e^c / (1 - v0 + v0 e^c) with
+c = 4 tanh(z); a forest gives v itself, its leaves lie in (0, 1). Features, gate and baseline do
+not change when i and j change places, so A_i F_ij = A_j F_ji.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Markers = dict[str, Array]
+
+# Bound on the network's log-odds correction: odds change by at most e^4 = 55.
+ODDS_BOUND = 4.0
+# Largest standard error of v that a network can predict.
+SPREAD_BOUND = 0.5
+
+
+@dataclass(frozen=True)
+class Marker:
+    """One input of a closure.
+
+    Attributes
+    ----------
+    name, meaning : str
+        Keyword of ``evaluate`` and what it stands for.
+    low, high : float
+        Hard range [-]; ``low_open`` excludes the lower end.
+    free : float, optional
+        Value where nothing stands between the spheres; None where it says nothing of that.
+    typical : (float, float), optional
+        Range to draw from when limits are checked; None for the two that describe the pair.
+    """
+
+    name: str
+    meaning: str
+    low: float
+    high: float
+    low_open: bool = False
+    free: float | None = None
+    typical: tuple[float, float] | None = None
+
+
+OVER_DISTANCE = Marker("radius_over_distance", "r_j / d", 0.0, 1.05, low_open=True)
+RATIO = Marker("radius_ratio", "r_j / r_i", 0.0, np.inf, low_open=True)
+COUNT = Marker(
+    "n_between", "spheres that reach into the hull of i and j", 0.0, np.inf,
+    free=0.0, typical=(0.0, 60.0),
+)  # fmt: skip
+FRACTION = Marker(
+    "solid_fraction", "solid fraction of the bed", 0.0, 1.0, low_open=True, typical=(0.02, 0.64)
+)
+BLOCKED = Marker(
+    "blocked_fraction", "blocked share of the pencil between i and j", 0.0, 1.0,
+    free=0.0, typical=(0.0, 1.0),
+)  # fmt: skip
+PER_LINE = Marker(
+    "blockers_per_line", "blockers a line of the pencil meets", 0.0, np.inf,
+    free=0.0, typical=(0.0, 10.0),
+)  # fmt: skip
+
+
+def _pair(m: Markers) -> tuple[Array, Array]:
+    """Features that i and j share: (r_i + r_j) / d and 4 r_i r_j / (r_i + r_j)^2."""
+    x, ratio = m["radius_over_distance"], m["radius_ratio"]
+    return x * (1.0 + 1.0 / ratio), 4.0 * ratio / (1.0 + ratio) ** 2
+
+
+def _published_features(m: Markers) -> Array:
+    return np.stack([*_pair(m), np.log1p(m["n_between"]), m["solid_fraction"]], axis=-1)
+
+
+def _published_gate(m: Markers) -> Array:
+    # Steep, because a single sphere on the axis can hide almost everything.
+    return -np.expm1(-6.0 * m["n_between"])
+
+
+def _published_baseline(m: Markers) -> Array:
+    return 0.01 + 0.98 * np.exp(-0.25 * m["n_between"])
+
+
+def _pencil_features(m: Markers) -> Array:
+    features = [*_pair(m), m["blocked_fraction"], np.log1p(m["blockers_per_line"])]
+    return np.stack(features, axis=-1)
+
+
+def _pencil_gate(m: Markers) -> Array:
+    free = 1.0 - m["blocked_fraction"]
+    # Squares instead of a power: the same bits in every exported language.
+    return 1.0 - (free * free) * (free * free)
+
+
+def _pencil_baseline(m: Markers) -> Array:
+    # Solves V = free for v, then kept off 0 and 1.
+    free = 1.0 - m["blocked_fraction"]
+    return 0.01 + 0.98 * (1.0 - 1.0 / (1.0 + free * (1.0 + free * (1.0 + free))))
+
+
+@dataclass(frozen=True)
+class MarkerSet:
+    """Inputs of a closure and what visibility makes of them."""
+
+    name: str
+    markers: tuple[Marker, ...]
+    feature_names: tuple[str, ...]
+    features: Callable[[Markers], Array]
+    gate: Callable[[Markers], Array]
+    baseline: Callable[[Markers], Array]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the markers, as keywords of ``evaluate``."""
+        return tuple(marker.name for marker in self.markers)
+
+
+_SHARED = ("(r_i + r_j) / d", "4 r_i r_j / (r_i + r_j)^2")
+
+MARKER_SETS = {
+    # Inputs of Tausendschoen, Stoeckl & Radl 2023, Particuology 74:119.
+    "published": MarkerSet(
+        "published",
+        (OVER_DISTANCE, COUNT, RATIO, FRACTION),
+        (*_SHARED, "log(1 + n_between)", "solid_fraction"),
+        _published_features,
+        _published_gate,
+        _published_baseline,
+    ),
+    "pencil": MarkerSet(
+        "pencil",
+        (OVER_DISTANCE, RATIO, BLOCKED, PER_LINE),
+        (*_SHARED, "blocked_fraction", "log(1 + blockers_per_line)"),
+        _pencil_features,
+        _pencil_gate,
+        _pencil_baseline,
+    ),
+}
+
+
+def unblocked_share(kind: str, baseline: Array, raw: Array) -> Array:
+    """v in (0, 1) from a predictor's first output [-]."""
+    if kind == "forest":
+        return raw
+    odds = np.exp(ODDS_BOUND * np.tanh(raw))
+    return baseline * odds / (1.0 - baseline + baseline * odds)
+
+
+def spread(kind: str, raw: Array) -> Array:
+    """Standard error of v from a predictor's second output [-]."""
+    if kind == "forest":
+        return raw
+    # exp of the negative magnitude only, so that no input overflows
+    e = np.exp(-np.abs(raw))
+    return SPREAD_BOUND * np.where(raw >= 0.0, 1.0, e) / (1.0 + e)

@@ -1,0 +1,21 @@
+"""Errors that end in one sentence (place, value, unit, bound, remedy) and exit code 2."""
+
+
+class GreybedError(Exception):
+    """Base of every error that a user can mend; the message is one sentence with its remedy."""
+
+
+class InputError(GreybedError, ValueError):
+    """Input that cannot be used as it is (file, row, value, unit, bound)."""
+
+
+class RangeError(GreybedError, ValueError):
+    """A value outside the range in which a law or closure holds."""
+
+
+class OutputError(GreybedError, OSError):
+    """A result that cannot be written where it was asked for."""
+
+
+class VerificationError(GreybedError, RuntimeError):
+    """A self-check that failed: golden rows, hash, limiting case."""

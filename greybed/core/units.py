@@ -1,0 +1,163 @@
+"""Units at the door: numbers with a unit in, base SI out; pint is loaded only when it is needed."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from greybed.core.errors import InputError
+
+# dimension -> (base SI unit, units to suggest in an error)
+DIMENSIONS = {
+    "length": ("m", "m, mm or um"),
+    "area": ("m**2", "m2 or mm2"),
+    "volume": ("m**3", "m3 or mm3"),
+    "time": ("s", "s, ms or min"),
+    "mass": ("kg", "kg or g"),
+    "temperature": ("K", "K or degC"),
+    "velocity": ("m/s", "m/s or mm/s"),
+    "acceleration": ("m/s**2", "m/s2"),
+    "density": ("kg/m**3", "kg/m3 or g/cm3"),
+    "force": ("N", "N or mN"),
+    "pressure": ("Pa", "Pa, kPa or bar"),
+    "viscosity": ("Pa*s", "Pa s or mPa s"),
+    "power": ("W", "W or mW"),
+    "heat flux": ("W/m**2", "W/m2 or kW/m2"),
+    "conductivity": ("W/m/K", "W/m/K"),
+    "heat capacity": ("J/kg/K", "J/kg/K or kJ/kg/K"),
+    "angle": ("rad", "deg or rad"),
+    "dimensionless": ("", "percent, or no unit"),
+}
+
+_WORD = r"[A-Za-zµμΩ°%_]+"
+_POWER = r"(?:(?:\*\*|\^)?[+-]?\d{1,2})?"
+# Products and quotients of unit names with short powers and nothing else: pint would also work
+# out towers of powers, which a file could use to keep it busy for ever.
+_UNIT = re.compile(rf"\s*{_WORD}{_POWER}(?:\s*[*/·]?\s*{_WORD}{_POWER})*\s*")
+_FACTOR = re.compile(rf"({_WORD})(?:\*\*|\^)?([+-]?\d{{1,2}})")
+_QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
+_LONGEST = 40
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry(cache_folder=None)
+
+
+def _shown(text: str) -> str:
+    return repr(text if len(text) <= _LONGEST else text[:_LONGEST] + "...")
+
+
+def to_si(values: ArrayLike, unit: str, dimension: str, where: str) -> NDArray[np.float64]:
+    """Convert numbers to base SI.
+
+    Parameters
+    ----------
+    values : array_like, any shape
+        Numbers in ``unit``; any value, NaN and infinity pass through.
+    unit : str
+        Unit such as ``mm``, ``m/s``, ``m s-1``, ``kg/m3`` or ``degC``.
+    dimension : str
+        What the numbers are: a key of ``DIMENSIONS``, such as ``length``.
+    where : str
+        Place named in an error: file, line, column, or option.
+
+    Returns
+    -------
+    converted : ndarray, shape of ``values``
+        The numbers in the base SI unit of ``dimension``.
+
+    Raises
+    ------
+    InputError
+        If the unit is missing, unknown, or of another dimension.
+
+    Examples
+    --------
+    >>> to_si([1.5, 20.0], "mm", "length", "option --sizes")
+    array([0.0015, 0.02  ])
+    """
+    base, advice = DIMENSIONS[dimension]
+    array = np.array(values, dtype=np.float64)
+    text = unit.strip()
+    if text == base:
+        return array
+    if not text:
+        raise InputError(f"{where}: the unit is missing; give a {dimension} in {advice}.")
+    unknown = f"{where}: unit {_shown(text)} is not known; give a {dimension} in {advice}."
+    if len(text) > _LONGEST or not _UNIT.fullmatch(text):
+        raise InputError(unknown)
+    import pint
+
+    plain = _FACTOR.sub(r"\1**\2", text.replace("·", "*"))
+    try:
+        registry = _registry()
+        with np.errstate(over="ignore", invalid="ignore"):
+            quantity = registry.Quantity(array, registry.parse_units(plain)).to(base)
+        return np.asarray(quantity.magnitude, dtype=np.float64)
+    except pint.DimensionalityError:
+        raise InputError(
+            f"{where}: unit {_shown(text)} does not measure a {dimension}; give it in {advice}."
+        ) from None
+    except (
+        pint.PintError,
+        ArithmeticError,
+        AttributeError,
+        LookupError,
+        SyntaxError,
+        TypeError,
+        ValueError,
+    ):
+        raise InputError(unknown) from None
+
+
+def parse_quantity(text: str, dimension: str, where: str = "value") -> float:
+    """Read one number with its unit, as typed on a command line.
+
+    Parameters
+    ----------
+    text : str
+        Number and unit, such as ``1.5 mm`` or ``20 degC``; the unit may be left out only where
+        ``dimension`` is ``dimensionless``.
+    dimension : str
+        A key of ``DIMENSIONS``.
+    where : str
+        Place named in an error, such as ``--radius``.
+
+    Returns
+    -------
+    value : float
+        The number in the base SI unit of ``dimension``.
+
+    Raises
+    ------
+    InputError
+        If the text is not a number with a unit of that dimension, or the number is not finite.
+
+    Examples
+    --------
+    >>> parse_quantity("1.5 mm", "length")
+    0.0015
+    """
+    _, advice = DIMENSIONS[dimension]
+    match = _QUANTITY.fullmatch(text)
+    if match is None:
+        raise InputError(
+            f"{where}: {_shown(text)} is not a number with a unit; give a {dimension} in {advice}."
+        )
+    number = float(match[1])
+    if not match[2] and dimension != "dimensionless":
+        raise InputError(
+            f"{where}: {_shown(text)} has no unit; give a {dimension} in {advice}, such as "
+            f"'{match[1]} {advice.split(',')[0].split(' or ')[0]}'."
+        )
+    value = float(to_si(number, match[2], dimension, where))
+    if not np.isfinite(value):
+        raise InputError(f"{where}: {_shown(text)} is not finite; give a finite {dimension}.")
+    return value

@@ -1,0 +1,21 @@
+"""The coupled thermal bed: conduction, radiation through view factors, steady and transient."""
+
+from greybed.coupling.conduction import Conductances, contact_conductances
+from greybed.coupling.radiation import NetRadiation, net_radiation
+from greybed.coupling.results import SolverError, Status, ThermalResult
+from greybed.coupling.rows import Rows, balanced
+from greybed.coupling.thermal import Material, ThermalBed
+
+__all__ = [
+    "Conductances",
+    "Material",
+    "NetRadiation",
+    "Rows",
+    "SolverError",
+    "Status",
+    "ThermalBed",
+    "ThermalResult",
+    "balanced",
+    "contact_conductances",
+    "net_radiation",
+]

@@ -1,0 +1,1 @@
+"""Generators: packings, lattices, size distributions, view-factor data sets."""

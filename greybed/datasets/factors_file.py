@@ -1,0 +1,247 @@
+"""View factors in HDF5, version 1: sparse rows with errors, walls, hash of the packing."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from greybed._version import __version__
+from greybed.core.errors import GreybedError, InputError
+from greybed.core.files import atomic_path
+from greybed.core.packing import Packing
+from greybed.core.readers.opening import listed, mapped, shown
+from greybed.core.walls import Plane
+from greybed.raytrace import ViewFactors
+
+FORMAT = "greybed-view-factors"
+VERSION = 1
+
+
+@dataclass(frozen=True, eq=False)
+class StoredFactors:
+    """What a view-factor file holds.
+
+    Attributes
+    ----------
+    result : ViewFactors
+        The factors; ``seconds`` is NaN, for the file states nothing of the machine.
+    packing_hash : str
+        :func:`packing_hash` of the packing they were traced from.
+    wall_names : tuple of str
+        Names of the walls, in the order of ``result.wall_factors``.
+    max_distance : float
+        Rays that met nothing within it escaped [m].
+    greybed : str
+        Version that wrote the file.
+    """
+
+    result: ViewFactors
+    packing_hash: str
+    wall_names: tuple[str, ...]
+    max_distance: float
+    greybed: str
+
+    def check(self, packing: Packing) -> None:
+        """Refuse a packing other than the one that was traced.
+
+        Raises
+        ------
+        InputError
+            If the hashes differ.
+        """
+        if packing_hash(packing) != self.packing_hash:
+            raise InputError(
+                f"{packing.source}: these view factors belong to another packing (other spheres, "
+                "box or walls); trace this one with greybed trace."
+            )
+
+
+def packing_hash(packing: Packing) -> str:
+    """SHA-256 of everything that view factors depend on, not of names or files."""
+    walls = [
+        ("plane", *w.point, *w.normal)
+        if isinstance(w, Plane)
+        else ("cylinder", *w.point, *w.axis, float(w.radius))
+        for w in packing.walls
+    ]
+    box = None if packing.box is None else packing.box.tolist()
+    digest = hashlib.sha256(json.dumps([len(packing), box, packing.periodic, walls]).encode())
+    for array in (packing.centres, packing.radii):
+        digest.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
+    return digest.hexdigest()
+
+
+def write_factors(
+    path: str | os.PathLike[str],
+    packing: Packing,
+    result: ViewFactors,
+    *,
+    max_distance: float = math.inf,
+) -> Path:
+    """Write view factors; equal results give equal bytes, for no time or machine is stored.
+
+    Parameters
+    ----------
+    path : path
+        File to write, whole or not at all.
+    packing : Packing
+        What was traced.
+    result : ViewFactors
+        As :func:`greybed.raytrace.view_factors` returned it.
+    max_distance : float
+        As it was traced with [m].
+
+    Raises
+    ------
+    InputError
+        If the packing and the result differ in size.
+    OutputError
+        If the file cannot be written.
+    """
+    import h5py
+
+    n, shape = len(packing), result.wall_factors.shape
+    if result.factors.shape != (n, n) or shape != (n, packing.n_walls):
+        raise InputError(
+            f"{path}: factors of shape {result.factors.shape} and walls {shape} do not belong to "
+            f"{n} spheres and {packing.n_walls} walls; give the packing that was traced."
+        )
+    row = np.repeat(np.arange(n), np.diff(result.factors.indptr))
+    arrays: dict[str, tuple[NDArray[Any], str]] = {
+        "factors/data": (result.factors.data, "-"),
+        "factors/indices": (result.factors.indices.astype(np.int64), "-"),
+        "factors/indptr": (result.factors.indptr.astype(np.int64), "-"),
+        "stderr/data": (result.stderr.data, "-"),
+        "walls/factors": (result.wall_factors, "-"),
+        "walls/stderr": (result.wall_stderr, "-"),
+        "escaped": (result.escaped, "-"),
+        "buried": (result.buried, "-"),
+        "areas": (result.areas, "m2"),
+        "sums/spheres": (np.bincount(row, result.factors.data, n), "-"),
+        "sums/walls": (result.wall_factors.sum(axis=1), "-"),
+    }
+    names = json.dumps([wall.name for wall in packing.walls])
+    # Check sums, and texts of fixed length: see core/writers/hdf5.py.
+    with atomic_path(path) as part, h5py.File(part, "w", libver=("v110", "v110")) as root:
+        root.attrs["format"] = np.bytes_(FORMAT)
+        root.attrs["version"] = VERSION
+        root.attrs["greybed"] = np.bytes_(__version__)
+        root.attrs["packing"] = np.bytes_(packing_hash(packing))
+        root.attrs["rays"] = result.rays
+        root.attrs["seed"] = result.seed
+        root.attrs["max_distance"] = max_distance
+        root.attrs["wall_names"] = np.bytes_(names)
+        for name, (values, unit) in arrays.items():
+            checked = {"chunks": True, "fletcher32": True} if values.size else {}
+            dataset = root.create_dataset(name, data=values, **checked)
+            dataset.attrs["units"] = np.bytes_(unit)
+    return Path(path)
+
+
+def read_factors(path: str | os.PathLike[str]) -> StoredFactors:
+    """Read a file of :func:`write_factors`.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+
+    Returns
+    -------
+    stored : StoredFactors
+        The same bits as were written.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, cut, damaged, or of another kind or version.
+    """
+    import h5py
+
+    place = Path(path)
+    with mapped(place):
+        pass  # refuses what is missing, empty, or no regular file
+    try:
+        with h5py.File(place, "r") as root:
+            return _read(place, root)
+    except GreybedError:
+        raise
+    except Exception as error:  # what h5py raises for a damaged file is not documented
+        raise InputError(
+            f"{place}: the HDF5 content is cut or damaged ({shown(str(error), 80)}); trace the "
+            "packing again with greybed trace."
+        ) from None
+
+
+def _text(root: Any, name: str) -> str:
+    value = root.attrs.get(name, b"missing")
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
+
+def _array(place: Path, root: Any, name: str, shape: tuple[int, ...], kind: str) -> NDArray[Any]:
+    import h5py
+
+    item = root.get(name)
+    fits = isinstance(item, h5py.Dataset) and item.shape == shape and item.dtype.kind == kind
+    if not fits or (item.size and item.nbytes > item.id.get_storage_size()):
+        raise InputError(
+            f"{place}: dataset {name!r} is missing, cut, or not of shape {shape}; trace the "
+            "packing again with greybed trace."
+        )
+    return np.asarray(item[()])
+
+
+def _read(place: Path, root: Any) -> StoredFactors:
+    kind, version = _text(root, "format"), root.attrs.get("version")
+    if kind != FORMAT:
+        raise InputError(
+            f"{place}: root attribute format = {shown(kind)} is not {FORMAT!r}; this HDF5 file "
+            f"holds no view factors (it has: {listed(list(root))}): give the view_factors.h5 of "
+            "greybed trace."
+        )
+    if version != VERSION:
+        raise InputError(
+            f"{place}: version = {shown(str(version))} of {FORMAT} is not {VERSION}, the one that "
+            "this greybed reads; install a newer greybed, or trace the packing again."
+        )
+    names = tuple(str(name) for name in json.loads(_text(root, "wall_names")))
+    n = int(root["escaped"].shape[0])
+    indptr = _array(place, root, "factors/indptr", (n + 1,), "i")
+    size = int(indptr[-1])
+    if indptr[0] != 0 or (np.diff(indptr) < 0).any():
+        raise InputError(f"{place}: factors/indptr does not rise from 0; trace the packing again.")
+    indices = _array(place, root, "factors/indices", (size,), "i")
+    if size and not (indices.min() >= 0 and indices.max() < n):
+        raise InputError(
+            f"{place}: factors/indices exceeds 0 ... {n - 1}; trace the packing again."
+        )
+    data = _array(place, root, "factors/data", (size,), "f")
+    errors = _array(place, root, "stderr/data", (size,), "f")
+    result = ViewFactors(
+        factors=sparse.csr_array((data, indices, indptr), shape=(n, n)),
+        stderr=sparse.csr_array((errors, indices, indptr), shape=(n, n)),
+        wall_factors=_array(place, root, "walls/factors", (n, len(names)), "f"),
+        wall_stderr=_array(place, root, "walls/stderr", (n, len(names)), "f"),
+        escaped=_array(place, root, "escaped", (n,), "f"),
+        buried=_array(place, root, "buried", (n,), "f"),
+        areas=_array(place, root, "areas", (n,), "f"),
+        rays=int(root.attrs["rays"]),
+        seed=int(root.attrs["seed"]),
+        seconds=math.nan,
+    )
+    return StoredFactors(
+        result,
+        _text(root, "packing"),
+        names,
+        float(root.attrs["max_distance"]),
+        _text(root, "greybed"),
+    )

@@ -1,0 +1,307 @@
+"""A closure as one self-contained C++11 header with golden rows, test program and CMake file."""
+
+from __future__ import annotations
+
+import os
+import textwrap
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from greybed.closures import ViewFactorClosure, golden_rows
+from greybed.closures.predictors import Forest, Network
+from greybed.closures.viewfactor.exact import TOUCHING, quadrature
+from greybed.closures.viewfactor.visibility import ODDS_BOUND, SPREAD_BOUND
+from greybed.core import InputError
+from greybed.core.files import atomic_path, output_folder
+from greybed.export.metadata import LICENCE, allowed, dataset_hash, describe, export_name
+
+# Relative difference that a golden row may show on another machine or with -ffast-math.
+TOLERANCE = 1e-12
+_LARGEST = float(np.finfo(np.float64).max)
+
+CMAKE = """\
+cmake_minimum_required(VERSION 3.10)
+project({name} CXX)
+
+# One header, nothing to build: link with greybed::{name} and include "{name}.hpp".
+add_library({name} INTERFACE)
+add_library(greybed::{name} ALIAS {name})
+target_include_directories({name} INTERFACE ${{CMAKE_CURRENT_SOURCE_DIR}})
+target_compile_features({name} INTERFACE cxx_std_11)
+
+enable_testing()
+add_executable({name}_test {name}_test.cpp)
+target_link_libraries({name}_test PRIVATE {name})
+add_test(NAME {name} COMMAND {name}_test)
+"""
+
+
+@dataclass(frozen=True)
+class Formulae:
+    """What a marker set computes, in C++: features, 1 - gate, gate and baseline of its markers."""
+
+    features: tuple[str, ...]
+    before: str
+    clear: str
+    gate: str
+    baseline: str
+
+
+_PAIR = (
+    "radius_over_distance * (1.0 + 1.0 / radius_ratio)",
+    "4.0 * radius_ratio / ((1.0 + radius_ratio) * (1.0 + radius_ratio))",
+)
+# The same operations in the same order as in greybed.closures.viewfactor.visibility: features of
+# a forest are cut to single precision, so their last bits can decide a branch. ``clear`` is
+# 1 - gate without the subtraction, because -ffast-math may cancel what it can put together.
+FORMULAE = {
+    "published": Formulae(
+        (*_PAIR, "std::log1p(n_between)", "solid_fraction"),
+        "",
+        "std::exp(-6.0 * n_between)",
+        "-std::expm1(-6.0 * n_between)",
+        "0.01 + 0.98 * std::exp(-0.25 * n_between)",
+    ),
+    "pencil": Formulae(
+        (*_PAIR, "blocked_fraction", "std::log1p(blockers_per_line)"),
+        "const double open = 1.0 - blocked_fraction;",
+        "(open * open) * (open * open)",
+        "1.0 - clear",
+        "0.01 + 0.98 * (1.0 - 1.0 / (1.0 + open * (1.0 + open * (1.0 + open))))",
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Table:
+    """A constant array of the header."""
+
+    name: str
+    ctype: str
+    values: NDArray
+
+    @property
+    def size(self) -> int:
+        """Number of entries."""
+        return self.values.size
+
+    @property
+    def text(self) -> str:
+        """The entries, several a line."""
+        # tolist() and repr give the fewest digits that read back as the same bits.
+        if self.ctype == "float":
+            words = [f"{word}f" for word in map(str, self.values.ravel())]
+        else:
+            words = [repr(value) for value in self.values.ravel().tolist()]
+        step = 16 if self.ctype.startswith("std::int") else 4
+        rows = (", ".join(words[k : k + step]) for k in range(0, len(words), step))
+        return ",\n      ".join(rows)
+
+    @property
+    def bits(self) -> list[int]:
+        """Each entry as an unsigned 64-bit number, for the checksum."""
+        flat = np.ascontiguousarray(self.values).ravel()
+        if self.ctype == "double":
+            return flat.view(np.uint64).tolist()
+        if self.ctype == "float":
+            return flat.view(np.uint32).tolist()
+        return flat.astype(np.int64).view(np.uint64).tolist()
+
+
+def checksum(tables: Iterable[Table]) -> int:
+    """FNV-1a over 64-bit words; every step is invertible, so no single change goes unseen."""
+    value = 0xCBF29CE484222325
+    for table in tables:
+        for word in table.bits:
+            value = ((value ^ word) * 0x100000001B3) & 0xFFFFFFFFFFFFFFFF
+    return value
+
+
+def _doubles(name: str, values: Any) -> Table:
+    # Adding zero turns -0.0 into 0.0, whose literal survives every compiler flag.
+    array = np.asarray(values, dtype=np.float64) + 0.0
+    if not np.isfinite(array).all():
+        raise InputError(f"{name} of the closure is not finite; train it again.")
+    return Table(name, "double", array)
+
+
+def _network_tables(network: Network) -> list[Table]:
+    tables = [_doubles("mean", network.mean), _doubles("scale", network.scale)]
+    for k, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
+        tables += [_doubles(f"weight_{k}", weight), _doubles(f"bias_{k}", bias)]
+    return tables
+
+
+def _forest_tables(forest: Forest) -> list[Table]:
+    leaf = forest.feature < 0
+    # A leaf needs no child, so its place holds the row of its values: half as many of them.
+    following = np.where(leaf, np.cumsum(leaf) - 1, forest.left)
+    threshold = np.where(leaf, np.float32(0), forest.threshold + np.float32(0))
+    if not np.isfinite(threshold).all():
+        raise InputError("a threshold of the closure is not finite; train it again.")
+    if forest.feature.max(initial=0) > 127:
+        raise InputError("the closure has more than 128 features; the header holds no more.")
+    return [
+        Table("roots", "std::int32_t", forest.roots),
+        Table("feature", "std::int8_t", forest.feature),
+        Table("threshold", "float", threshold.astype(np.float32)),
+        Table("following", "std::int32_t", following.astype(np.int32)),
+        _doubles("leaf_values", forest.value[leaf]),
+    ]
+
+
+def _finite(values: Any) -> NDArray:
+    """Infinite bounds as the largest numbers: -ffast-math knows no infinity."""
+    return np.clip(np.asarray(values, dtype=np.float64), -_LARGEST, _LARGEST)
+
+
+def _context(closure: ViewFactorClosure, name: str) -> dict[str, Any]:
+    if closure.markers.name not in FORMULAE:
+        raise InputError(
+            f"the marker set {closure.markers.name!r} has no form in C++; "
+            f"known are {', '.join(FORMULAE)}."
+        )
+    formulae = FORMULAE[closure.markers.name]
+    predictor, domain = closure.predictor, closure.domain
+    squares, weights = quadrature()
+    with np.errstate(over="ignore"):
+        limit2 = float(_finite(np.float64(domain.limit) ** 2))
+    tables = [
+        _doubles("node_square", squares),
+        _doubles("node_weight", weights),
+        _doubles("domain_low", _finite(domain.low)),
+        _doubles("domain_high", _finite(domain.high)),
+        _doubles("domain_centre", domain.centre),
+        _doubles("domain_precision", domain.precision),
+    ]
+    context: dict[str, Any] = {}
+    if isinstance(predictor, Network):
+        tables += _network_tables(predictor)
+        sizes = [len(predictor.mean), *(len(bias) for bias in predictor.biases)]
+        context["layers"] = list(pairwise(sizes))
+    else:
+        tables += _forest_tables(predictor)
+    inputs, outputs = golden_rows(closure)
+    golden = [
+        *(_doubles(f"golden_{n}", c) for n, c in zip(closure.marker_names, inputs.T, strict=True)),
+        _doubles("golden_factor", outputs[:, 0]),
+        _doubles("golden_stderr", outputs[:, 1]),
+    ]
+    return {
+        **context,
+        "meta": describe(closure, name),
+        "name": name,
+        "guard": f"GREYBED_{name.upper()}_HPP",
+        "kind": closure.kind,
+        "markers": closure.markers.markers,
+        "allowed": allowed,
+        "largest": repr(_LARGEST),
+        "reach": repr(1.0 / (1.0 - TOUCHING)),
+        "features": list(zip(closure.markers.feature_names, formulae.features, strict=True)),
+        "formulae": formulae,
+        "odds_bound": repr(ODDS_BOUND),
+        "spread_bound": repr(SPREAD_BOUND),
+        "limit2": repr(limit2),
+        "tables": tables,
+        "golden": golden,
+        "rows": len(inputs),
+        "tolerance": repr(TOLERANCE),
+        "checksum": f"0x{checksum(tables):016x}ULL",
+        "dataset_hash": dataset_hash(closure),
+        "licence": LICENCE,
+    }
+
+
+@cache
+def _environment() -> Any:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    environment = Environment(
+        loader=PackageLoader("greybed.export"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,  # C++ is no HTML
+    )
+    environment.filters["quoted"] = _quoted
+    environment.filters["wrapped"] = _wrapped
+    return environment
+
+
+def _wrapped(line: str) -> str:
+    """A long line of C++, continued four columns further in."""
+    body = line.strip().replace("double* ", "double*\1")  # kept with the name that follows
+    indent = " " * (len(line) - len(line.lstrip()))
+    text = textwrap.fill(
+        body,
+        100,
+        initial_indent=indent,
+        subsequent_indent=indent + "    ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return text.replace("\1", " ") + "\n"
+
+
+def _quoted(text: str) -> str:
+    """A C++ string literal: printable ASCII, everything else as octal bytes."""
+    # Octal escapes end after three digits, hexadecimal ones swallow what follows.
+    body = "".join(
+        chr(byte) if 32 <= byte < 127 and byte not in b'"\\?' else f"\\{byte:03o}"
+        for byte in text.encode()
+    )
+    return f'"{body}"'
+
+
+def export_cpp(
+    closure: ViewFactorClosure, folder: str | os.PathLike[str], name: str | None = None
+) -> Path:
+    """Write ``NAME.hpp``, ``NAME_test.cpp``, ``CMakeLists.txt`` and ``README.md``.
+
+    Parameters
+    ----------
+    closure : ViewFactorClosure
+        What to export.
+    folder : path
+        Made if it does not exist.
+    name : str, optional
+        Namespace inside ``greybed`` and stem of the files; made from the closure by default.
+
+    Returns
+    -------
+    header : Path
+        The header: C++11, no heap, no threads, nothing to link but the C++ library.
+
+    Raises
+    ------
+    InputError
+        If the name is no C++ identifier, or the closure holds numbers that are not finite.
+    OutputError
+        If a file cannot be written.
+
+    Notes
+    -----
+    The header's ``self_test()`` replays the golden rows to a relative 1e-12 and compares a
+    checksum of every constant; ``NAME_test.cpp`` runs it and evaluates CSV rows.
+    """
+    word = export_name(closure, name)
+    context = _context(closure, word)
+    target = output_folder(folder)
+    files = {
+        f"{word}.hpp": _environment().get_template("closure.hpp").render(context),
+        f"{word}_test.cpp": _environment().get_template("closure_test.cpp").render(context),
+        "README.md": _environment().get_template("README.md").render(context),
+        "CMakeLists.txt": CMAKE.format(name=word),
+    }
+    for file, text in files.items():
+        with atomic_path(target / file) as temporary:
+            temporary.write_text(text, encoding="ascii")
+    return target / f"{word}.hpp"

@@ -1,0 +1,72 @@
+"""What every exported form says of itself: name, versions, hashes, licence, its markers."""
+
+from __future__ import annotations
+
+import re
+from math import isinf
+
+from greybed._version import __version__
+from greybed.closures import ViewFactorClosure, content_hash
+from greybed.closures.viewfactor.visibility import Marker
+from greybed.core import InputError
+
+LICENCE = "BSD-3-Clause"
+
+# Words of C++20 that would break the namespace of a header; identifiers with __ are refused too.
+_RESERVED = """
+    alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t
+    char32_t class compl concept const consteval constexpr constinit const_cast continue co_await
+    co_return co_yield decltype default delete do double dynamic_cast else enum explicit export
+    extern false float for friend goto if inline int long mutable namespace new noexcept not not_eq
+    nullptr operator or or_eq private protected public register reinterpret_cast requires return
+    short signed sizeof static static_assert static_cast struct switch template this thread_local
+    throw true try typedef typeid typename union unsigned using virtual void volatile wchar_t while
+    xor xor_eq std greybed"""
+
+
+def export_name(closure: ViewFactorClosure, name: str | None = None) -> str:
+    """Name of an export: ``name`` if it is an identifier, else one made from the closure.
+
+    Raises
+    ------
+    InputError
+        If ``name`` is no identifier in C++.
+    """
+    if name is None:
+        return f"{closure.quantity}_{closure.markers.name}_{closure.kind}"
+    sound = re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,99}", name) and "__" not in name
+    if not sound or name in _RESERVED.split():
+        raise InputError(
+            f"the name {name!r} cannot be a namespace in C++; use letters, digits and single "
+            "underscores, a letter first, such as 'bed_closure'."
+        )
+    return name
+
+
+def allowed(marker: Marker) -> str:
+    """The range of a marker, as text."""
+    opening = "(" if marker.low_open else "["
+    return f"{opening}{marker.low:g}, {marker.high:g}{')' if isinf(marker.high) else ']'}"
+
+
+def dataset_hash(closure: ViewFactorClosure) -> str:
+    """SHA-256 of the training data set as the card has it, or an empty string."""
+    return str(closure.card.get("data_sha256", ""))
+
+
+def describe(closure: ViewFactorClosure, name: str) -> dict[str, str]:
+    """Plain strings that travel with every exported form."""
+    return {
+        "name": name,
+        "quantity": "view factor F_ij between spheres [-]",
+        "kind": closure.kind,
+        "marker_set": closure.markers.name,
+        "greybed_version": __version__,
+        "hash": content_hash(closure),
+        "dataset_hash": dataset_hash(closure),
+        "licence": LICENCE,
+        **{
+            f"marker_{marker.name}": f"{marker.meaning} [-], in {allowed(marker)}"
+            for marker in closure.markers.markers
+        },
+    }

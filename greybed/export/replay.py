@@ -1,0 +1,254 @@
+"""Runs exported closures: compiles the header, opens the graph, replays the golden rows."""
+
+from __future__ import annotations
+
+import io
+import os
+import shlex
+import shutil
+import subprocess
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from greybed.closures import ViewFactorClosure, content_hash, golden_rows
+from greybed.closures.viewfactor import Prediction
+from greybed.core import InputError, RangeError, VerificationError
+from greybed.core.files import output_folder
+
+Array = NDArray[np.float64]
+
+CPP_TOLERANCE = 1e-12
+# Runtimes have their own exp and tanh; double precision leaves about 1e-14.
+ONNX_TOLERANCE = 1e-6
+
+
+class Exported(Protocol):
+    """An exported closure that answers as the closure itself does."""
+
+    hash: str
+    marker_names: tuple[str, ...]
+
+    def predict(self, **markers: ArrayLike) -> Prediction:
+        """Factor, standard error and extrapolation of each pair."""
+        ...
+
+
+def find_compiler() -> list[str] | None:
+    """The C++ compiler as words of a command: ``CXX`` if set, else g++, clang++ or c++."""
+    chosen = shlex.split(os.environ.get("CXX", ""))
+    for words in [chosen] if chosen else [["g++"], ["clang++"], ["c++"]]:
+        if shutil.which(words[0]):
+            return words
+    return None
+
+
+def compile_cpp(
+    header: str | os.PathLike[str],
+    folder: str | os.PathLike[str],
+    flags: Sequence[str] = ("-std=c++11", "-O2"),
+) -> Path:
+    """Compile the test program of an exported header.
+
+    Parameters
+    ----------
+    header : path
+        What :func:`greybed.export.export_cpp` returned; ``NAME_test.cpp`` stands beside it.
+    folder : path
+        Where the program goes.
+    flags : sequence of str
+        Options of the compiler.
+
+    Returns
+    -------
+    program : Path
+
+    Raises
+    ------
+    InputError
+        If there is no C++ compiler.
+    VerificationError
+        If the compiler refuses the header.
+    """
+    compiler = find_compiler()
+    if compiler is None:
+        raise InputError(
+            f"no C++ compiler found (CXX = {os.environ.get('CXX', '')!r}, g++, clang++, c++); "
+            "install one or set CXX to its path."
+        )
+    source = Path(header).resolve()
+    source = source.with_name(f"{source.stem}_test.cpp")
+    program = output_folder(folder).resolve() / source.stem
+    command = [*compiler, *flags, str(source), "-o", str(program)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode:
+        lines = [line for line in done.stderr.splitlines() if "error" in line] or [done.stderr]
+        raise VerificationError(
+            f"{source}: {compiler[0]} {' '.join(flags)} refuses it: {lines[0].strip()}; "
+            "try other flags or another compiler in CXX."
+        )
+    return program
+
+
+def _flat(
+    names: tuple[str, ...], markers: Mapping[str, ArrayLike]
+) -> tuple[list[Array], tuple[int, ...]]:
+    if set(names) != set(markers):
+        raise RangeError(
+            f"this closure takes the markers {', '.join(names)}, not "
+            f"{', '.join(markers) or 'none'}; name each of them once."
+        )
+    arrays = np.broadcast_arrays(*(np.asarray(markers[n], dtype=np.float64) for n in names))
+    return [np.ascontiguousarray(a).ravel() for a in arrays], arrays[0].shape
+
+
+class CompiledClosure:
+    """A closure exported to C++, answering through its compiled test program.
+
+    Unlike in Python, markers out of range give NaN instead of an error.
+
+    Parameters
+    ----------
+    program : path
+        What :func:`compile_cpp` returned.
+
+    Attributes
+    ----------
+    name, hash : str
+        As the program says them.
+    marker_names : tuple of str
+        Markers in the order of the header's arguments.
+    failing_rows : int
+        What the header's ``self_test()`` returned: zero means sound.
+    """
+
+    def __init__(self, program: str | os.PathLike[str]) -> None:
+        self.program = Path(program)
+        done = subprocess.run([self.program], capture_output=True, text=True)
+        facts = dict(line.split(" ", 1) for line in done.stdout.splitlines() if " " in line)
+        try:
+            self.name, self.hash = facts["name"], facts["hash"]
+            self.marker_names = tuple(facts["markers"].split(","))
+            self.failing_rows = int(facts["failing"].split()[0])
+        except (KeyError, ValueError, IndexError):
+            raise VerificationError(
+                f"{self.program}: does not answer as the test program of a closure (exit code "
+                f"{done.returncode}); export and compile it again."
+            ) from None
+
+    def evaluate(self, **markers: ArrayLike) -> Array:
+        """View factors F_ij [-] of markers by name."""
+        return self.predict(**markers).view_factor
+
+    def predict(self, **markers: ArrayLike) -> Prediction:
+        """Factor, standard error and extrapolation; all pairs in one call of the program."""
+        columns, shape = _flat(self.marker_names, markers)
+        form = ",".join(["%.17g"] * len(columns))
+        rows = (form % row for row in zip(*(c.tolist() for c in columns), strict=True))
+        text = "\n".join([",".join(self.marker_names), *rows, ""])
+        done = subprocess.run([self.program, "rows"], input=text, capture_output=True, text=True)
+        if done.returncode:
+            raise VerificationError(
+                f"{self.program}: exit code {done.returncode} ({done.stderr.strip()}); "
+                "export and compile it again."
+            )
+        # A header line alone is a legal answer to no rows.
+        table = np.empty((0, 3))
+        if columns[0].size:
+            table = np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1, ndmin=2)
+        return Prediction(
+            table[:, 0].reshape(shape),
+            table[:, 1].reshape(shape),
+            (table[:, 2] > 0.0).reshape(shape),
+        )
+
+
+class OnnxClosure:
+    """A closure exported to ONNX, answering through onnxruntime on one thread.
+
+    Unlike in Python, markers out of range give NaN instead of an error.
+
+    Parameters
+    ----------
+    path : path
+        What :func:`greybed.export.export_onnx` returned.
+
+    Attributes
+    ----------
+    metadata : dict of str
+        Name, hash, versions, licence and the meanings of the markers.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        import onnxruntime
+
+        options = onnxruntime.SessionOptions()
+        options.intra_op_num_threads = 1
+        options.log_severity_level = 3  # errors only: a missing GPU is none
+        try:
+            self._session = onnxruntime.InferenceSession(
+                os.fspath(path), options, providers=["CPUExecutionProvider"]
+            )
+        except Exception as error:  # onnxruntime raises a class of its own for every reason
+            reason = str(error).splitlines()[0]
+            raise InputError(
+                f"{path}: onnxruntime cannot open this graph ({reason}); export it again."
+            ) from None
+        self.metadata = dict(self._session.get_modelmeta().custom_metadata_map)
+        self.name, self.hash = self.metadata.get("name", ""), self.metadata.get("hash", "")
+        self.marker_names = tuple(value.name for value in self._session.get_inputs())
+
+    def evaluate(self, **markers: ArrayLike) -> Array:
+        """View factors F_ij [-] of markers by name."""
+        return self.predict(**markers).view_factor
+
+    def predict(self, **markers: ArrayLike) -> Prediction:
+        """Factor, standard error and extrapolation."""
+        columns, shape = _flat(self.marker_names, markers)
+        feed = dict(zip(self.marker_names, columns, strict=True))
+        results = self._session.run(["view_factor", "stderr", "extrapolates"], feed)
+        return Prediction(*(np.reshape(result, shape) for result in results))
+
+
+def relative_error(value: Array, expected: Array) -> Array:
+    """|value - expected| / |expected|; zero where both are zero, infinite where NaN came out."""
+    size = np.maximum(np.abs(expected), 1e-300)
+    return np.nan_to_num(np.abs(value - expected) / size, nan=np.inf, posinf=np.inf)
+
+
+def replay(closure: ViewFactorClosure, exported: Exported, tolerance: float) -> dict[str, Any]:
+    """Replay the golden rows through an exported form.
+
+    Parameters
+    ----------
+    closure : ViewFactorClosure
+        What was exported.
+    exported : CompiledClosure or OnnxClosure
+        The exported form.
+    tolerance : float
+        Relative difference that a row may show [-].
+
+    Returns
+    -------
+    result : dict
+        ``rows``, ``failing_rows``, ``max_relative_error``, ``tolerance``, ``same_hash``, and
+        ``passed`` where every row holds, the hashes agree, and the form's own self-test passes.
+    """
+    inputs, expected = golden_rows(closure)
+    answer = exported.predict(**dict(zip(closure.marker_names, inputs.T, strict=True)))
+    error = relative_error(np.stack([answer.view_factor, answer.stderr], axis=1), expected)
+    same_hash = exported.hash == content_hash(closure)
+    failing = int((error > tolerance).any(axis=1).sum())
+    own = int(getattr(exported, "failing_rows", 0))
+    return {
+        "rows": len(inputs),
+        "failing_rows": failing,
+        "self_test": own,
+        "max_relative_error": float(error.max()),
+        "tolerance": tolerance,
+        "same_hash": same_hash,
+        "passed": failing == 0 and own == 0 and same_hash,
+    }

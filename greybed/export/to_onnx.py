@@ -1,0 +1,314 @@
+"""A closure as an ONNX graph in double precision: markers by name in, view factor and error out."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from greybed.closures import ViewFactorClosure
+from greybed.closures.predictors import Forest, Network
+from greybed.closures.viewfactor.exact import TOUCHING, quadrature
+from greybed.closures.viewfactor.visibility import ODDS_BOUND, SPREAD_BOUND
+from greybed.core import InputError
+from greybed.core.files import atomic_path
+from greybed.export.metadata import describe, export_name
+
+# Operators of 2022, so that older runtimes read a network; a forest needs TreeEnsemble of 2024,
+# the first one that gives doubles.
+OPSET, IR_VERSION = 17, 8
+ML_OPSET, ML_IR_VERSION = 5, 10
+ML_DOMAIN = "ai.onnx.ml"
+
+
+class Graph:
+    """Nodes and constants of a graph under construction; every value is known by its name."""
+
+    def __init__(self) -> None:
+        self.nodes: list[Any] = []
+        self.constants: dict[str, Any] = {}
+
+    def constant(self, value: Any) -> str:
+        """Name of a constant; equal numbers are stored once."""
+        from onnx import numpy_helper
+
+        array = np.asarray(value)
+        key = f"constant_{len(self.constants)}"
+        for name, known in self.constants.items():
+            same = numpy_helper.to_array(known)
+            if same.dtype == array.dtype and np.array_equal(same, array) and array.ndim == 0:
+                return name
+        self.constants[key] = numpy_helper.from_array(array, key)
+        return key
+
+    def add(self, op: str, *inputs: str | float | NDArray, out: str = "", **attributes: Any) -> str:
+        """Append a node; numbers among the inputs become constants in double precision."""
+        from onnx import helper
+
+        names = [
+            value if isinstance(value, str) else self.constant(np.asarray(value))
+            for value in inputs
+        ]
+        result = out or f"{op.lower()}_{len(self.nodes)}"
+        self.nodes.append(helper.make_node(op, names, [result], name=result, **attributes))
+        return result
+
+    def column(self, value: str) -> str:
+        """[N] to [N, 1]."""
+        return self.add("Unsqueeze", value, np.array([1], dtype=np.int64))
+
+    def sum_columns(self, value: str) -> str:
+        """[N, k] to [N]."""
+        return self.add("ReduceSum", value, np.array([1], dtype=np.int64), keepdims=0)
+
+
+def _log1p(g: Graph, x: str) -> str:
+    """log(1 + x) to full relative precision (Kahan), as its single-precision cut may decide."""
+    u = g.add("Add", 1.0, x)
+    moved = g.add("Sub", u, 1.0)
+    still = g.add("Equal", moved, 0.0)
+    safe = g.add("Where", still, 1.0, moved)
+    return g.add("Where", still, x, g.add("Div", g.add("Mul", g.add("Log", u), x), safe))
+
+
+def _pair(g: Graph) -> tuple[str, str]:
+    ratio = "radius_ratio"
+    reach = g.add("Mul", "radius_over_distance", g.add("Add", 1.0, g.add("Div", 1.0, ratio)))
+    total = g.add("Add", 1.0, ratio)
+    return reach, g.add("Div", g.add("Mul", 4.0, ratio), g.add("Mul", total, total))
+
+
+def _published(g: Graph) -> tuple[list[str], tuple[str, str], str]:
+    """Names of the features, of 1 - gate and gate, and of the baseline."""
+    n = "n_between"
+    # 1 - exp(-6 n) = 2 t / (1 + t) with t = tanh(3 n): exact zero at n = 0, no cancellation.
+    t = g.add("Tanh", g.add("Mul", 3.0, n))
+    gate = g.add("Div", g.add("Mul", 2.0, t), g.add("Add", 1.0, t))
+    clear = g.add("Exp", g.add("Mul", -6.0, n))
+    baseline = g.add("Add", 0.01, g.add("Mul", 0.98, g.add("Exp", g.add("Mul", -0.25, n))))
+    return [*_pair(g), _log1p(g, n), "solid_fraction"], (clear, gate), baseline
+
+
+def _pencil(g: Graph) -> tuple[list[str], tuple[str, str], str]:
+    """Names of the features, of 1 - gate and gate, and of the baseline."""
+    free = g.add("Sub", 1.0, "blocked_fraction")
+    square = g.add("Mul", free, free)
+    clear = g.add("Mul", square, square)
+    gate = g.add("Sub", 1.0, clear)
+    cubic = g.add("Add", 1.0, free)
+    for _ in range(2):
+        cubic = g.add("Add", 1.0, g.add("Mul", free, cubic))
+    share = g.add("Sub", 1.0, g.add("Div", 1.0, cubic))
+    baseline = g.add("Add", 0.01, g.add("Mul", 0.98, share))
+    return [*_pair(g), "blocked_fraction", _log1p(g, "blockers_per_line")], (clear, gate), baseline
+
+
+FORMULAE = {"published": _published, "pencil": _pencil}
+
+
+def _pair_factor(g: Graph) -> str:
+    x = "radius_over_distance"
+    other = g.add("Div", x, "radius_ratio")
+    kappa = g.add("Mul", g.add("Mul", 4.0, x), other)
+    both = g.add("Add", x, other)
+    eps = g.add("Max", g.add("Sub", 1.0, g.add("Mul", both, both)), 0.0)
+    square, weight = quadrature()
+    under = g.add("Add", g.column(eps), g.add("Mul", g.column(kappa), square[None, :]))
+    terms = g.add("Div", weight[None, :], g.add("Add", 1.0, g.add("Sqrt", under)))
+    return g.add("Mul", g.add("Mul", x, x), g.sum_columns(terms))
+
+
+def _network(g: Graph, network: Network, features: str) -> str:
+    x = g.add("Div", g.add("Sub", features, network.mean), network.scale)
+    for k, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
+        x = g.add("Add", g.add("MatMul", x, np.ascontiguousarray(weight)), bias)
+        if k + 1 < len(network.weights):
+            x = g.add("Tanh", x)
+    return x
+
+
+def _forest(g: Graph, forest: Forest, features: str) -> str:
+    from onnx import TensorProto, numpy_helper
+
+    # Cut to single precision and back: comparing doubles then agrees with comparing singles.
+    single = g.add("Cast", features, to=TensorProto.FLOAT)
+    cut = g.add("Cast", single, to=TensorProto.DOUBLE)
+    leaf = forest.feature < 0
+    inner = np.flatnonzero(~leaf)
+    n_inner, n_leaves = len(inner), int(leaf.sum())
+    # Where a node went: its row among the inner nodes or among the leaves.
+    row = np.where(leaf, np.cumsum(leaf), np.cumsum(~leaf)) - 1
+    left, right = forest.left[inner], forest.left[inner] + 1
+    roots, feature = row[forest.roots], forest.feature[inner]
+    split = forest.threshold[inner].astype(np.float64)
+    branches = [row[left], leaf[left], row[right], leaf[right]]
+    lonely = leaf[forest.roots]
+    if lonely.any():  # a tree must begin with a node: one whose branches both reach the leaf
+        extra = roots[lonely]
+        roots = roots.copy()
+        roots[lonely] = n_inner + np.arange(len(extra))
+        feature = np.concatenate([feature, np.zeros(len(extra), feature.dtype)])
+        split = np.concatenate([split, np.zeros(len(extra))])
+        stop = np.ones(len(extra), bool)
+        more = [extra, stop, extra, stop]
+        branches = [np.concatenate(pair) for pair in zip(branches, more, strict=True)]
+        n_inner += len(extra)
+    # A leaf has one target in this operator, so the trees stand twice: for value and for spread.
+    true_at, true_leaf, false_at, false_leaf = branches
+
+    def twice(at: NDArray, is_leaf: NDArray) -> list[int]:
+        return np.concatenate([at, at + np.where(is_leaf, n_leaves, n_inner)]).tolist()
+
+    total = g.add(
+        "TreeEnsemble",
+        cut,
+        domain=ML_DOMAIN,
+        aggregate_function=1,  # sum
+        n_targets=2,
+        tree_roots=np.concatenate([roots, roots + n_inner]).tolist(),
+        nodes_featureids=np.tile(feature, 2).tolist(),
+        nodes_modes=numpy_helper.from_array(np.zeros(2 * n_inner, np.uint8), "modes"),  # <=
+        nodes_splits=numpy_helper.from_array(np.tile(split, 2), "splits"),
+        nodes_truenodeids=twice(true_at, true_leaf),
+        nodes_trueleafs=np.tile(true_leaf, 2).astype(int).tolist(),
+        nodes_falsenodeids=twice(false_at, false_leaf),
+        nodes_falseleafs=np.tile(false_leaf, 2).astype(int).tolist(),
+        leaf_targetids=np.repeat([0, 1], n_leaves).tolist(),
+        leaf_weights=numpy_helper.from_array(forest.value[leaf].T.ravel(), "leaves"),
+    )
+    return g.add("Div", total, float(len(forest.roots)))
+
+
+def _bounds(g: Graph, raw_value: str, raw_spread: str, baseline: str) -> tuple[str, str]:
+    """A network's v in (0, 1) and its standard error."""
+    odds = g.add("Exp", g.add("Mul", ODDS_BOUND, g.add("Tanh", raw_value)))
+    bent = g.add("Mul", baseline, odds)
+    share = g.add("Div", bent, g.add("Add", g.add("Sub", 1.0, baseline), bent))
+    e = g.add("Exp", g.add("Neg", g.add("Abs", raw_spread)))
+    upper = g.add("Where", g.add("GreaterOrEqual", raw_spread, 0.0), 1.0, e)
+    error = g.add("Div", g.add("Mul", SPREAD_BOUND, upper), g.add("Add", 1.0, e))
+    return share, error
+
+
+def _in_range(g: Graph, closure: ViewFactorClosure, reach: str) -> str:
+    """Whether all markers lie where the closure is defined; false for NaN."""
+    valid = g.add("LessOrEqual", reach, 1.0 / (1.0 - TOUCHING))
+    for marker in closure.markers.markers:
+        lower = g.add("Greater" if marker.low_open else "GreaterOrEqual", marker.name, marker.low)
+        high = min(marker.high, float(np.finfo(np.float64).max))
+        upper = g.add("LessOrEqual", marker.name, high)
+        valid = g.add("And", valid, g.add("And", lower, upper))
+    return valid
+
+
+def _outside(g: Graph, closure: ViewFactorClosure, features: str) -> str:
+    domain = closure.domain
+    beyond = g.add(
+        "Or", g.add("Less", features, domain.low), g.add("Greater", features, domain.high)
+    )
+    count = g.sum_columns(g.add("Cast", beyond, to=11))
+    away = g.add("Sub", features, domain.centre)
+    distance2 = g.sum_columns(g.add("Mul", g.add("MatMul", away, domain.precision), away))
+    far = g.add("Greater", distance2, float(domain.limit) ** 2)
+    return g.add("Or", g.add("Greater", count, 0.0), far)
+
+
+def _fill(g: Graph, closure: ViewFactorClosure) -> None:
+    columns, (clear, gate), baseline = FORMULAE[closure.markers.name](g)
+    features = g.add("Concat", *(g.column(name) for name in columns), axis=1)
+    predictor = closure.predictor
+    if isinstance(predictor, Network):
+        raw = _network(g, predictor, features)
+    else:
+        raw = _forest(g, predictor, features)
+    first = g.add("Gather", raw, np.array(0, dtype=np.int64), axis=1)
+    second = g.add("Gather", raw, np.array(1, dtype=np.int64), axis=1)
+    if closure.kind == "mlp":
+        first, second = _bounds(g, first, second, baseline)
+    exact = _pair_factor(g)
+    # 1 - gate (1 - v) without the cancellation where v is small
+    visible = g.add("Add", clear, g.add("Mul", gate, first))
+    factor = g.add("Mul", exact, visible)
+    error = g.add("Mul", g.add("Mul", exact, gate), second)
+    valid = _in_range(g, closure, columns[0])
+    g.add("Where", valid, factor, np.nan, out="view_factor")
+    g.add("Where", valid, error, np.nan, out="stderr")
+    far = g.add("And", g.add("Greater", gate, 0.0), _outside(g, closure, features))
+    g.add("Or", far, g.add("Not", valid), out="extrapolates")
+
+
+def export_onnx(
+    closure: ViewFactorClosure, path: str | os.PathLike[str], name: str | None = None
+) -> Path:
+    """Write a closure as an ONNX graph.
+
+    Parameters
+    ----------
+    closure : ViewFactorClosure
+        What to export.
+    path : path
+        File to write.
+    name : str, optional
+        Name of the graph; made from the closure by default.
+
+    Returns
+    -------
+    file : Path
+        Inputs: the markers by name, each float64 [N]. Outputs: ``view_factor`` and ``stderr``,
+        float64 [N], NaN where a marker is out of range; ``extrapolates``, bool [N].
+
+    Raises
+    ------
+    InputError
+        If the closure has no form in ONNX.
+    OutputError
+        If the file cannot be written.
+
+    Notes
+    -----
+    The graph is checked in full before it is written. Everything is computed in double precision,
+    a forest's branches in single precision as in Python.
+    """
+    import onnx
+    from onnx import TensorProto, helper
+
+    word = export_name(closure, name)
+    if closure.markers.name not in FORMULAE:
+        raise InputError(
+            f"the marker set {closure.markers.name!r} has no form in ONNX; "
+            f"known are {', '.join(FORMULAE)}."
+        )
+    g = Graph()
+    _fill(g, closure)
+    # A name as length, since a runtime must take any number of pairs.
+    inputs = [
+        helper.make_tensor_value_info(marker.name, TensorProto.DOUBLE, ["N"], marker.meaning)
+        for marker in closure.markers.markers
+    ]
+    outputs = [
+        helper.make_tensor_value_info("view_factor", TensorProto.DOUBLE, ["N"]),
+        helper.make_tensor_value_info("stderr", TensorProto.DOUBLE, ["N"]),
+        helper.make_tensor_value_info("extrapolates", TensorProto.BOOL, ["N"]),
+    ]
+    graph = helper.make_graph(g.nodes, word, inputs, outputs, list(g.constants.values()))
+    opsets = [helper.make_opsetid("", OPSET)]
+    if closure.kind == "forest":
+        opsets.append(helper.make_opsetid(ML_DOMAIN, ML_OPSET))
+    facts = describe(closure, word)
+    model = helper.make_model(
+        graph,
+        opset_imports=opsets,
+        ir_version=ML_IR_VERSION if closure.kind == "forest" else IR_VERSION,
+        producer_name="greybed",
+        producer_version=facts["greybed_version"],
+        doc_string="F_ij = F_exact V, V = 1 - gate (1 - v); gate = 0 where nothing stands between",
+    )
+    helper.set_model_props(model, facts)
+    onnx.checker.check_model(model, full_check=True)
+    target = Path(path)
+    with atomic_path(target) as temporary:
+        temporary.write_bytes(model.SerializeToString(deterministic=True))
+    return target

@@ -1,0 +1,377 @@
+"""Compiled ray tracing: random streams, emission from spheres, cell-grid traversal, tallies."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+_OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+# Keys of the tallies: spheres are their number plus the coded image, walls -1 - k, escape this.
+ESCAPED = -(2**62)
+# Attempts to start a ray on exposed surface before a sphere counts as wholly buried.
+MAX_ATTEMPTS = 1000
+# Image shifts are coded in ten bits an axis; a ray that goes further counts as escaped.
+IMAGE_LIMIT = 500
+IMAGE_SPAN = 1024
+
+_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+_MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
+_MIX_2 = np.uint64(0x94D049BB133111EB)
+_S30, _S27, _S31, _S32 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(32)
+_LOW = np.uint64(0xFFFFFFFF)
+_TO_UNIT = 2.0**-31
+
+
+@njit(**_OPTIONS)
+def _mix(z):
+    """Finaliser of SplitMix64 (Steele, Lea & Flood 2014, doi 10.1145/2660193.2660195)."""
+    z = (z ^ (z >> _S30)) * _MIX_1
+    z = (z ^ (z >> _S27)) * _MIX_2
+    return z ^ (z >> _S31)
+
+
+@njit(**_OPTIONS)
+def _in_disc(state):
+    """Uniform point of the unit disc: x, y, x^2 + y^2 and the advanced state."""
+    # Rejection costs 1.27 draws on average, less than a sine and a cosine; one draw gives both
+    # coordinates, on a grid of 2^-31 that no tally can resolve.
+    while True:
+        state += _GOLDEN
+        bits = _mix(state)
+        x = np.float64(np.int32(bits >> _S32)) * _TO_UNIT
+        y = np.float64(np.int32(bits & _LOW)) * _TO_UNIT
+        s = x * x + y * y
+        if s < 1.0:
+            return x, y, s, state
+
+
+@njit(**_OPTIONS)
+def _emit(state):
+    """Ray leaving the unit sphere with a cosine law: direction, surface point, state.
+
+    Seen from far away a Lambertian sphere is a uniformly bright disc whatever the direction.
+    So the direction is isotropic and the point uniform on the disc across it: the same law as
+    a uniform surface point with a cosine-weighted direction, without trigonometry.
+    """
+    x, y, s, state = _in_disc(state)
+    w = 2.0 * math.sqrt(1.0 - s)
+    dx, dy, dz = x * w, y * w, 1.0 - 2.0 * s
+    u, v, s, state = _in_disc(state)
+    # Orthonormal basis without branches: Duff et al. 2017, jcgt.org/published/0006/01/01
+    sign = math.copysign(1.0, dz)
+    a = -1.0 / (sign + dz)
+    b = dx * dy * a
+    lift = math.sqrt(1.0 - s)
+    px = u * (1.0 + sign * dx * dx * a) + v * b + lift * dx
+    py = u * (sign * b) + v * (sign + dy * dy * a) + lift * dy
+    pz = u * (-sign * dx) - v * dy + lift * dz
+    return dx, dy, dz, px, py, pz, state
+
+
+@njit(**_OPTIONS)
+def _wall_hit(ox, oy, oz, dx, dy, dz, planes, cylinders):
+    """Nearest wall ahead: distance (inf where none) and wall number, planes first."""
+    nearest, wall = np.inf, -1
+    for k in range(planes.shape[0]):
+        towards = dx * planes[k, 3] + dy * planes[k, 4] + dz * planes[k, 5]
+        if towards < 0.0:
+            height = (
+                (ox - planes[k, 0]) * planes[k, 3]
+                + (oy - planes[k, 1]) * planes[k, 4]
+                + (oz - planes[k, 2]) * planes[k, 5]
+            )
+            t = -height / towards
+            if t < nearest:
+                nearest, wall = t, k
+    for k in range(cylinders.shape[0]):
+        ax, ay, az = cylinders[k, 3], cylinders[k, 4], cylinders[k, 5]
+        rx, ry, rz = ox - cylinders[k, 0], oy - cylinders[k, 1], oz - cylinders[k, 2]
+        along_d = dx * ax + dy * ay + dz * az
+        along_r = rx * ax + ry * ay + rz * az
+        ux, uy, uz = dx - along_d * ax, dy - along_d * ay, dz - along_d * az
+        qx, qy, qz = rx - along_r * ax, ry - along_r * ay, rz - along_r * az
+        a = ux * ux + uy * uy + uz * uz
+        if a > 0.0:
+            b = qx * ux + qy * uy + qz * uz
+            c = qx * qx + qy * qy + qz * qz - cylinders[k, 6] ** 2
+            root = b * b - a * c
+            if root > 0.0:
+                t = (math.sqrt(root) - b) / a
+                if t < nearest:
+                    nearest, wall = t, planes.shape[0] + k
+    return nearest, wall
+
+
+@njit(**_OPTIONS)
+def _cell_of(position, low, inverse, count):
+    """Cell number along one axis, clamped: emission points may lie a rounding outside."""
+    return max(min(np.int64((position - low) * inverse), count - 1), 0)
+
+
+@njit(**_OPTIONS)
+def _walk(direction, position, low, cell, index, count):
+    """Walk along one axis: step, distance to the next face, between faces, cells left ahead."""
+    # Selections instead of branches: the sign is random, and a wrong guess costs more than this.
+    ahead = direction > 0.0
+    pace = 1.0 / direction if direction != 0.0 else np.inf
+    to_face = (low + (index + ahead) * cell - position) * pace
+    return (
+        1 if ahead else -1,
+        to_face if direction != 0.0 else np.inf,
+        abs(cell * pace),
+        count - 1 - index if ahead else index,
+    )
+
+
+# Inlined: as a call it would pass its many arguments through the stack for every ray.
+@njit(inline="always", **_OPTIONS)
+def march(ox, oy, oz, dx, dy, dz, limit, frame, start, items):
+    """First sphere along a ray, no further than ``limit``: distance, item, boxes crossed.
+
+    Walks the cells that the ray crosses (Amanatides & Woo 1987) and stops at the first cell
+    whose exit lies behind the nearest hit. Across periodic faces the origin moves back by one
+    box while the ray goes on. Item is -1 where the ray meets no sphere.
+    """
+    low, cell, inverse = frame.low, frame.cell, frame.inverse
+    nx, ny, nz = frame.nx, frame.ny, frame.nz
+    ix = _cell_of(ox, low[0], inverse[0], nx)
+    iy = _cell_of(oy, low[1], inverse[1], ny)
+    iz = _cell_of(oz, low[2], inverse[2], nz)
+    step_x, next_x, span_x, left_x = _walk(dx, ox, low[0], cell[0], ix, nx)
+    step_y, next_y, span_y, left_y = _walk(dy, oy, low[1], cell[1], iy, ny)
+    step_z, next_z, span_z, left_z = _walk(dz, oz, low[2], cell[2], iz, nz)
+    stride_x, stride_y, stride_z = step_x * ny * nz, step_y * nz, step_z
+    c = (ix * ny + iy) * nz + iz
+    sx, sy, sz = 0, 0, 0
+    hit_x, hit_y, hit_z = 0, 0, 0
+    nearest, found = limit, -1
+    while True:
+        # Unsigned indices: for signed ones every access first tests for a count from the end,
+        # which costs a third of the whole trace.
+        for m in range(np.uint64(start[np.uint64(c)]), np.uint64(start[np.uint64(c + 1)])):
+            k = np.uint64(4) * np.uint64(m)
+            qx = items[k] - ox
+            qy = items[k + np.uint64(1)] - oy
+            qz = items[k + np.uint64(2)] - oz
+            b = qx * dx + qy * dy + qz * dz
+            root = b * b - (qx * qx + qy * qy + qz * qz) + items[k + np.uint64(3)]
+            # Spheres behind the origin include the emitter itself: it needs no other test.
+            if b > 0.0 and root > 0.0:
+                t = b - math.sqrt(root)
+                if t < nearest:
+                    nearest, found = t, np.int64(m)
+                    # The walk may cross into another box before it is sure of this hit.
+                    hit_x, hit_y, hit_z = sx, sy, sz
+        exit_at = min(next_x, min(next_y, next_z))
+        if nearest <= exit_at:
+            break
+        # Which face is crossed is as good as random: selections, no branches to guess wrong.
+        cross_x, cross_y, cross_z = next_x == exit_at, next_y == exit_at, next_z == exit_at
+        next_x += span_x if cross_x else 0.0
+        next_y += span_y if cross_y else 0.0
+        next_z += span_z if cross_z else 0.0
+        c += (stride_x if cross_x else 0) + (stride_y if cross_y else 0)
+        c += stride_z if cross_z else 0
+        left_x -= cross_x
+        left_y -= cross_y
+        left_z -= cross_z
+        if left_x < 0 or left_y < 0 or left_z < 0:
+            if left_x < 0:
+                sx, left_x, c = sx + step_x, nx - 1, c - stride_x * nx
+                ox -= step_x * frame.edge[0]
+                if not frame.periodic[0] or abs(sx) > IMAGE_LIMIT:
+                    break
+            if left_y < 0:
+                sy, left_y, c = sy + step_y, ny - 1, c - stride_y * ny
+                oy -= step_y * frame.edge[1]
+                if not frame.periodic[1] or abs(sy) > IMAGE_LIMIT:
+                    break
+            if left_z < 0:
+                sz, left_z, c = sz + step_z, nz - 1, c - stride_z * nz
+                oz -= step_z * frame.edge[2]
+                if not frame.periodic[2] or abs(sz) > IMAGE_LIMIT:
+                    break
+    return nearest, found, hit_x, hit_y, hit_z
+
+
+@njit(**_OPTIONS)
+def _buried(x, y, z, frame, start, items, planes, cylinders):
+    """Whether a surface point lies inside another sphere or behind a wall."""
+    low, inverse = frame.low, frame.inverse
+    ix = _cell_of(x, low[0], inverse[0], frame.nx)
+    iy = _cell_of(y, low[1], inverse[1], frame.ny)
+    iz = _cell_of(z, low[2], inverse[2], frame.nz)
+    c = (ix * frame.ny + iy) * frame.nz + iz
+    for k in range(4 * np.int64(start[c]), 4 * np.int64(start[c + 1]), 4):
+        qx, qy, qz = items[k] - x, items[k + 1] - y, items[k + 2] - z
+        # The emitter itself is in the list, at its radius but for rounding.
+        if qx * qx + qy * qy + qz * qz < items[k + 3] * (1.0 - 1e-9):
+            return True
+    for k in range(planes.shape[0]):
+        height = (
+            (x - planes[k, 0]) * planes[k, 3]
+            + (y - planes[k, 1]) * planes[k, 4]
+            + (z - planes[k, 2]) * planes[k, 5]
+        )
+        if height < 0.0:
+            return True
+    for k in range(cylinders.shape[0]):
+        qx, qy, qz = x - cylinders[k, 0], y - cylinders[k, 1], z - cylinders[k, 2]
+        along = qx * cylinders[k, 3] + qy * cylinders[k, 4] + qz * cylinders[k, 5]
+        if qx * qx + qy * qy + qz * qz - along * along > cylinders[k, 6] ** 2:
+            return True
+    return False
+
+
+@njit(**_OPTIONS)
+def _wrapped(position, low, edge, periodic):
+    """Coordinate moved into the box along a periodic axis, and the boxes moved by."""
+    if periodic and position < low:
+        return position + edge, -1
+    if periodic and position >= low + edge:
+        return position - edge, 1
+    return position, 0
+
+
+@njit(**_OPTIONS)
+def _count(key, keys, counts, slots, used, mask):
+    """Add one to a key of an open-addressing table; returns the number of slots in use."""
+    slot = np.int64(_mix(np.uint64(key)) & np.uint64(mask))
+    while counts[slot] > 0:
+        if keys[slot] == key:
+            counts[slot] += 1
+            return used
+        slot = (slot + 1) & mask
+    keys[slot] = key
+    counts[slot] = 1
+    slots[used] = slot
+    return used + 1
+
+
+@njit(**_OPTIONS)
+def trace_sphere(
+    sphere, first_ray, last_ray, seed, centre, radius, exposed, images, grid, planes, cylinders,
+    limit, keys, counts, slots,
+):  # fmt: skip
+    """Trace rays [first_ray, last_ray) of one sphere into the table ``keys``, ``counts``.
+
+    The table's size is a power of two above the number of rays, so it cannot fill up; ``slots``
+    lists its places in use. Returns the number of keys and of starts rejected because they lay on
+    buried surface (-1 where the whole sphere is buried). Ray k of sphere i draws from its own
+    stream, so neither the order nor the thread of the work changes a bit of the result.
+    """
+    mask = keys.size - 1
+    used = 0
+    rejected = 0
+    frame, start, items, owner, image = grid
+    low, edge, periodic = frame.low, frame.edge, frame.periodic
+    stream = _mix(np.uint64(seed) * _MIX_1 + _mix(np.uint64(sphere) + _GOLDEN))
+    for ray in range(first_ray, last_ray):
+        state = _mix(stream + np.uint64(ray) * _GOLDEN)
+        attempt = 0
+        while True:
+            dx, dy, dz, ox, oy, oz, state = _emit(state)
+            ox, sx = _wrapped(centre[0] + radius * ox, low[0], edge[0], periodic[0])
+            oy, sy = _wrapped(centre[1] + radius * oy, low[1], edge[1], periodic[1])
+            oz, sz = _wrapped(centre[2] + radius * oz, low[2], edge[2], periodic[2])
+            if exposed or not _buried(ox, oy, oz, frame, start, items, planes, cylinders):
+                break
+            attempt += 1
+            if attempt == MAX_ATTEMPTS:
+                return used, -1
+        rejected += attempt
+        behind, wall = _wall_hit(ox, oy, oz, dx, dy, dz, planes, cylinders)
+        _, item, mx, my, mz = march(ox, oy, oz, dx, dy, dz, min(limit, behind), frame, start, items)
+        if item >= 0:
+            key = np.int64(owner[item])
+            if images:
+                cx = sx + mx + np.int64(image[3 * item + 0]) + IMAGE_SPAN // 2
+                cy = sy + my + np.int64(image[3 * item + 1]) + IMAGE_SPAN // 2
+                cz = sz + mz + np.int64(image[3 * item + 2]) + IMAGE_SPAN // 2
+                key += ((cx * IMAGE_SPAN + cy) * IMAGE_SPAN + cz) << 32
+        elif wall >= 0 and behind <= limit:
+            key = np.int64(-1 - wall)
+        else:
+            key = np.int64(ESCAPED)
+        used = _count(key, keys, counts, slots, used, mask)
+    return used, rejected
+
+
+@njit(**_OPTIONS)
+def trace_block(
+    tasks, seed, centres, radii, exposed, images, grid, planes, cylinders, limit, keys, counts,
+    slots, out_keys, out_counts, ends, rejected,
+):  # fmt: skip
+    """Trace tasks (sphere, first ray, last ray), one after the other, and store their tallies.
+
+    Task k fills ``out_keys`` and ``out_counts`` up to ``ends[k]``, sorted by key. Returns the
+    number of tasks done; fewer than asked where the output is full.
+    """
+    filled = 0
+    counts[:] = 0
+    for k in range(tasks.shape[0]):
+        i = tasks[k, 0]
+        used, rejected[k] = trace_sphere(
+            i, tasks[k, 1], tasks[k, 2], seed, centres[i], radii[i], exposed[i], images, grid,
+            planes, cylinders, limit, keys, counts, slots,
+        )  # fmt: skip
+        if filled + used > out_keys.size:
+            return k
+        # Into key order, and the table empty again for the next task.
+        found = keys[slots[:used]]
+        order = np.argsort(found)
+        for m in range(used):
+            slot = slots[order[m]]
+            out_keys[filled + m] = keys[slot]
+            out_counts[filled + m] = counts[slot]
+        for m in range(used):
+            counts[slots[m]] = 0
+        filled += used
+        ends[k] = filled
+    return tasks.shape[0]
+
+
+@njit(**_OPTIONS)
+def _into_box(position, low, edge, periodic):
+    """Coordinate moved by whole boxes into the box along a periodic axis."""
+    return position - edge * math.floor((position - low) / edge) if periodic else position
+
+
+@njit(**_OPTIONS)
+def first_hits(origins, directions, grid, planes, cylinders, distance, owner):
+    """Nearest sphere or wall of free rays: ``distance`` (inf where none) and ``owner``.
+
+    ``owner`` is the sphere, -1 - k for wall k, and -1 - n_walls for nothing.
+    """
+    frame, start, items, owners, _ = grid
+    nothing = -1 - planes.shape[0] - cylinders.shape[0]
+    for k in range(origins.shape[0]):
+        ox, oy, oz = origins[k, 0], origins[k, 1], origins[k, 2]
+        dx, dy, dz = directions[k, 0], directions[k, 1], directions[k, 2]
+        behind, wall = _wall_hit(ox, oy, oz, dx, dy, dz, planes, cylinders)
+        owner[k] = -1 - wall if wall >= 0 else nothing
+        # An origin outside the grid first moves to where the ray enters it.
+        enter, leave = 0.0, behind
+        for axis in range(3):
+            o, d = origins[k, axis], directions[k, axis]
+            low, high = frame.low[axis], frame.low[axis] + frame.edge[axis]
+            if frame.periodic[axis]:
+                continue
+            if d == 0.0:
+                if o < low or o > high:
+                    leave = -1.0
+                continue
+            near, far = (low - o) / d, (high - o) / d
+            enter = max(enter, min(near, far))
+            leave = min(leave, max(near, far))
+        distance[k] = behind
+        if enter > leave:
+            continue
+        ox = _into_box(ox + enter * dx, frame.low[0], frame.edge[0], frame.periodic[0])
+        oy = _into_box(oy + enter * dy, frame.low[1], frame.edge[1], frame.periodic[1])
+        oz = _into_box(oz + enter * dz, frame.low[2], frame.edge[2], frame.periodic[2])
+        t, item, _, _, _ = march(ox, oy, oz, dx, dy, dz, behind - enter, frame, start, items)
+        if item >= 0:
+            distance[k] = t + enter
+            owner[k] = owners[item]

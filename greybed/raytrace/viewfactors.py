@@ -1,0 +1,159 @@
+"""View factors of a packing by Monte Carlo: sparse, with a standard error for every factor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+
+from greybed.core import Packing
+from greybed.raytrace import _kernels, tally
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ViewFactors:
+    """View factors F_ij: the fraction of the radiation leaving i that reaches j directly.
+
+    Attributes
+    ----------
+    factors : csr_array, shape (n, n)
+        Sphere to sphere [-], periodic images summed. Row i, all ``wall_factors[i]`` and
+        ``escaped[i]`` add up to one.
+    stderr : csr_array, shape (n, n)
+        Standard errors of ``factors`` [-], same pattern.
+    wall_factors, wall_stderr : ndarray, shape (n, n_walls)
+        Sphere to wall, in the order of ``packing.walls`` [-].
+    escaped : ndarray, shape (n,)
+        Fraction that meets nothing [-].
+    buried : ndarray, shape (n,)
+        Fraction of the surface inside other spheres or walls [-]. Rays start on the rest.
+    areas : ndarray, shape (n,)
+        Exposed surface 4 pi r^2 (1 - buried) [m2]: with it ``A_i F_ij = A_j F_ji`` holds within
+        the errors.
+    rays : int
+        Rays per sphere [-].
+    seed : int
+        Seed of the random streams.
+    seconds : float
+        Wall time [s].
+    """
+
+    factors: sparse.csr_array
+    stderr: sparse.csr_array
+    wall_factors: Array
+    wall_stderr: Array
+    escaped: Array
+    buried: Array
+    areas: Array
+    rays: int
+    seed: int
+    seconds: float
+
+
+def standard_error(count: ArrayLike, rays: ArrayLike) -> Array:
+    """Standard error of a hit fraction ``count / rays`` [-].
+
+    The binomial error after two more hits and two more misses (Agresti & Coull 1998,
+    doi 10.1080/00031305.1998.10480550). It tends to sqrt(p (1 - p) / N) for large counts and,
+    unlike it, stays honest for small ones: intervals of 1.96 errors hold the truth in 95 % of
+    the cases from three expected hits up, and no hit does not claim certainty.
+    """
+    k, n = np.asarray(count, dtype=np.float64), np.asarray(rays, dtype=np.float64)
+    return np.sqrt((k + 2.0) * (n - k + 2.0) / (n + 4.0)) / (n + 4.0)
+
+
+def view_factors(
+    packing: Packing,
+    *,
+    rays: int = 10_000,
+    seed: int = 0,
+    threads: int | None = None,
+    emitters: ArrayLike | None = None,
+    max_distance: float = np.inf,
+    show_progress: bool = False,
+) -> ViewFactors:
+    """Trace the view factors of a packing.
+
+    Rays leave each sphere's exposed surface with a cosine law and end at the first sphere or
+    wall. Every ray draws from its own random stream, so a seed gives the same bits on any number
+    of threads.
+
+    Parameters
+    ----------
+    packing : Packing
+        Spheres of any sizes, open or periodic, with planes and cylinders as walls.
+    rays : int
+        Rays per sphere, at least 1 [-].
+    seed : int
+        Seed, at least 0.
+    threads : int, optional
+        Threads; all available ones by default.
+    emitters : array_like of int, optional
+        Trace only from these spheres; the other rows are empty (walls, escape: NaN).
+    max_distance : float
+        Rays that meet nothing within it count as escaped [m].
+    show_progress : bool
+        Draw a progress bar on standard error.
+
+    Returns
+    -------
+    ViewFactors
+
+    Raises
+    ------
+    InputError
+        For numbers out of range, walls that do not repeat along a periodic direction, or a
+        sphere wholly inside others.
+
+    Notes
+    -----
+    Overlaps: surface inside another sphere or behind a wall neither emits nor receives; factors
+    refer to the exposed surface. See ``docs/overlaps.md``.
+
+    Examples
+    --------
+    >>> pair = Packing([[0, 0, 0], [2, 0, 0]], 1.0)
+    >>> result = view_factors(pair, rays=100_000)
+    >>> bool(abs(result.factors[0, 1] - 0.0755868) < 4 * result.stderr[0, 1])
+    True
+    """
+    counts = tally.trace(
+        packing,
+        rays=rays,
+        seed=seed,
+        threads=threads,
+        emitters=emitters,
+        max_distance=max_distance,
+        show_progress=show_progress,
+    )
+    n = len(packing)
+    traced = np.isfinite(counts.buried)
+    to_sphere = counts.key >= 0
+    start = np.searchsorted(counts.emitter[to_sphere], np.arange(n + 1))
+    index = counts.key[to_sphere]
+    hits = counts.count[to_sphere]
+    shape = (n, n)
+    factors = sparse.csr_array((hits / counts.rays, index, start), shape=shape)
+    errors = sparse.csr_array((standard_error(hits, counts.rays), index, start), shape=shape)
+    walls = np.where(traced[:, None], 0.0, np.full((n, packing.n_walls), np.nan))
+    escaped = np.where(traced, 0.0, np.nan)
+    lost = counts.key == _kernels.ESCAPED
+    escaped[counts.emitter[lost]] = counts.count[lost] / counts.rays
+    at_wall = (counts.key < 0) & ~lost
+    walls[counts.emitter[at_wall], -1 - counts.key[at_wall]] = counts.count[at_wall] / counts.rays
+    return ViewFactors(
+        factors=factors,
+        stderr=errors,
+        wall_factors=walls,
+        wall_stderr=standard_error(walls * counts.rays, counts.rays),
+        escaped=escaped,
+        buried=counts.buried,
+        areas=packing.areas * (1.0 - counts.buried),
+        rays=counts.rays,
+        seed=seed,
+        seconds=counts.seconds,
+    )

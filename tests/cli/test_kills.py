@@ -1,0 +1,347 @@
+"""Runs that are killed, interrupted, doubled, or given other threads: nothing lost, same bits."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from greybed.core import OutputError
+from greybed.core.files import sole_writer
+from greybed.report.stages import Stages
+
+DESIGN = "rays = 6000\nemitters = 40\nseed = 4\n" + "".join(
+    f'[[packing]]\nkind = "random"\ncount = 300\nshake = 20\nfraction = {fraction}\n'
+    for fraction in (0.2, 0.25, 0.3, 0.35, 0.4, 0.45)
+)
+DATASET = ("dataset", "viewfactor", "long.toml", "--out", "out/data.h5")
+
+posix = pytest.mark.skipif(os.name != "posix", reason="POSIX signals")
+
+
+def command(*words):
+    return [sys.executable, "-m", "greybed", *map(str, words)]
+
+
+def start(words, folder, **environment):
+    return subprocess.Popen(
+        command(*words),
+        cwd=folder,
+        env={**os.environ, **environment},
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        # A shell that runs the tests in the background may have turned Ctrl-C off for them.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+
+
+def finish(words, folder, **environment):
+    done = subprocess.run(
+        command(*words),
+        cwd=folder,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    return done
+
+
+def wait_for(ready, process, seconds=60.0):
+    end = time.monotonic() + seconds
+    while not ready():
+        assert process.poll() is None, process.stderr.read()
+        assert time.monotonic() < end
+        time.sleep(0.002)
+
+
+def sha(path):
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+
+
+def parts(folder):
+    return sorted((folder / "out/data.h5.parts").glob("[!.]*.npz"))
+
+
+@pytest.fixture(scope="module")
+def long_design(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("long")
+    (folder / "long.toml").write_text(DESIGN)
+    finish(DATASET, folder)
+    return folder
+
+
+@posix
+@pytest.mark.parametrize("done", [0, 2, 5])
+def test_a_killed_data_set_goes_on(long_design, tmp_path, done):
+    shutil.copy(long_design / "long.toml", tmp_path)
+    process = start(DATASET, tmp_path)
+    wait_for(lambda: len(parts(tmp_path)) >= done and (tmp_path / "out").exists(), process)
+    process.kill()
+    process.communicate()
+    kept = {path: (path.stat().st_mtime_ns, path.stat().st_ino) for path in parts(tmp_path)}
+    assert not (tmp_path / "out/data.h5").exists() or done == 5
+    again = start(DATASET, tmp_path)
+    seen = {}
+    while again.poll() is None:
+        for path in parts(tmp_path):
+            try:
+                seen[path] = (path.stat().st_mtime_ns, path.stat().st_ino)
+            except FileNotFoundError:  # the run has just cleaned up
+                break
+        time.sleep(0.002)
+    assert again.returncode == 0, again.stderr.read()
+    again.stderr.close()
+    assert all(seen.get(path, kept[path]) == kept[path] for path in kept), "a part was remade"
+    assert sha(tmp_path / "out/data.h5") == sha(long_design / "out/data.h5")
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"data.h5", "summary.json"}
+
+
+def test_a_part_that_was_cut_is_made_again(long_design, tmp_path, monkeypatch):
+    from greybed.cli import main
+
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(long_design / "long.toml", tmp_path)
+    text = DESIGN.replace("6000", "200").split("[[packing]]")
+    Path("short.toml").write_text("[[packing]]".join(text[:3]))
+    words = ["dataset", "viewfactor", "short.toml", "--out", "out/data.h5"]
+    monkeypatch.setattr(shutil, "rmtree", lambda *args, **options: None)
+    assert main(words) == 0
+    before = sha("out/data.h5")
+    cut = parts(tmp_path)
+    assert len(cut) == 2
+    cut[0].write_bytes(cut[0].read_bytes()[:999])
+    assert main(words) == 0
+    assert sha("out/data.h5") == before
+
+
+@posix
+def test_a_killed_training_leaves_no_half_closure(here):
+    words = ("train", "viewfactor", "data.h5", "--epochs", 300, "--name", "new", "--out", "out")
+    process = start(words, here)
+    wait_for((here / "out").exists, process)
+    time.sleep(0.3)
+    process.kill()
+    process.communicate()
+    assert not (here / "out/new.closure").exists()
+    words = [2 if word == 300 else word for word in words]
+    finish(words, here)
+    first = sha(here / "out/new.closure")
+    finish(words, here)
+    assert sha(here / "out/new.closure") == first
+
+
+@posix
+def test_a_killed_quickstart_holds_whole_files_only(tmp_path):
+    process = start(("quickstart", "--small", "--out", "out"), tmp_path)
+    record = tmp_path / "out/.state/dataset.json"
+    wait_for(record.exists, process)
+    process.kill()
+    process.communicate()
+    hashes = json.loads(record.read_text())["files"]
+    assert hashes == {"viewfactors.h5": sha(tmp_path / "out/viewfactors.h5")}
+    left = {path.name for path in (tmp_path / "out").iterdir() if not path.name.startswith(".")}
+    assert "summary.json" not in left
+    assert "report.html" not in left
+
+
+def test_a_stage_whose_record_was_cut_is_done_again(tmp_path):
+    calls = []
+
+    def work():
+        calls.append(1)
+        (tmp_path / "file").write_text("x")
+        return {"a": 1}, {}, [tmp_path / "file"]
+
+    def run():
+        return Stages(tmp_path, {}, lambda line: None).run("one", "one", work)
+
+    run()
+    run()
+    assert len(calls) == 1
+    for name, content in (("one.npz", b"PK"), ("one.json", b"[]"), ("one.json", b'{"key": 1')):
+        (tmp_path / ".state" / name).write_bytes(content)
+        assert run()[0] == {"a": 1}
+    assert len(calls) == 4
+
+
+INTERRUPTS = {
+    "info": ("info", "bed.csv"),
+    "convert": ("convert", "bed.csv", "out.h5"),
+    "pack": ("pack", "--count", 20_000, "--fraction", 0.6, "--sizes", "mono:1mm", "--out", "out"),
+    "trace": ("trace", "bed.csv", "--rays", 50_000_000, "--out", "out"),
+    "dataset": ("dataset", "viewfactor", "--out", "out/d.h5"),
+    "train": ("train", "viewfactor", "data.h5", "--epochs", 9000, "--out", "out"),
+    "forest": ("train", "viewfactor", "data.h5", "--model", "forest", "--out", "out"),
+    "check": ("check", "mlp.closure", "--exported", "onnx"),
+    "export": ("export", "mlp.closure", "--to", "onnx", "--out", "out"),
+    "simulate": ("simulate", "case.toml", "--out", "out"),
+    "quickstart": ("quickstart", "--small", "--out", "out"),
+}
+
+
+@posix
+@pytest.mark.parametrize("verb", INTERRUPTS)
+def test_ctrl_c_is_one_sentence(here, verb):
+    for delay in (0.15, 1.0):
+        process = start(INTERRUPTS[verb], here)
+        try:
+            process.wait(delay)
+        except subprocess.TimeoutExpired:
+            process.send_signal(signal.SIGINT)
+        said = process.communicate(timeout=60)[1]
+        if process.returncode == 0:  # it was done before
+            continue
+        # Where it strikes inside Python's own exec of a string, as dataclasses use, the process
+        # ends by the signal itself, which a shell shows as 130 too.
+        assert process.returncode in (130, -signal.SIGINT), said
+        assert "Traceback" not in said
+        lines = [s for s in re.split(r"[\r\n]", said) if s.strip() and "%|" not in s]
+        if process.returncode == -signal.SIGINT and not lines:
+            continue  # the verb was done, the interpreter was about to end
+        assert len(lines) == 1, said
+        assert re.fullmatch(r"greybed \w+: interrupted; what was finished is kept\.", lines[0])
+
+
+# Without any cache Numba compiles; its callbacks swallow the first Ctrl-C.
+@posix
+def test_ctrl_c_while_numba_compiles(here, tmp_path):
+    cache = tmp_path / "cache"
+    process = start(("trace", "bed.csv", "--rays", 10, "--out", "out"), here,
+                    NUMBA_CACHE_DIR=str(cache))  # fmt: skip
+    try:
+        process.wait(1.5)
+    except subprocess.TimeoutExpired:
+        process.send_signal(signal.SIGINT)
+    said = process.communicate(timeout=60)[1]
+    assert process.returncode in (0, 130, -signal.SIGINT), said
+    assert "Traceback" not in said
+    assert "Exception ignored" not in said
+
+
+def test_a_swallowed_ctrl_c_is_sent_again(monkeypatch):
+    from types import SimpleNamespace
+
+    from greybed.cli import main as main_function
+
+    module = sys.modules[main_function.__module__]
+    others = []
+    hook = module._keep_interrupt(others.append)
+    hook(SimpleNamespace(exc_type=ValueError))
+    assert len(others) == 1
+    caught = False
+    try:
+        hook(SimpleNamespace(exc_type=KeyboardInterrupt))
+        for _ in range(500):  # short, for this kind of signal ends no sleep
+            time.sleep(0.01)
+    except KeyboardInterrupt:
+        caught = True
+    assert caught
+
+
+@posix
+def test_a_second_run_in_the_same_place_is_refused(long_design, tmp_path):
+    shutil.copy(long_design / "long.toml", tmp_path)
+    first = start(DATASET, tmp_path)
+    wait_for(lambda: len(parts(tmp_path)) >= 1, first)
+    second = subprocess.run(command(*DATASET), cwd=tmp_path, capture_output=True, text=True)
+    assert second.returncode == 2
+    assert f"out: another run (process {first.pid}) is writing there" in second.stderr
+    first.communicate()
+    assert first.returncode == 0
+    assert sha(tmp_path / "out/data.h5") == sha(long_design / "out/data.h5")
+
+
+@posix
+def test_locks_end_with_their_run(tmp_path):
+    lock = tmp_path / ".lock"
+    lock.write_text("999999\n")  # as a killed run leaves it
+    with sole_writer(lock):
+        assert lock.read_text() == f"{os.getpid()}\n"
+        with pytest.raises(OutputError, match=rf"process {os.getpid()}\) is writing there"):
+            sole_writer(lock).__enter__()
+    assert not lock.exists()
+    with pytest.raises(ZeroDivisionError), sole_writer(lock):
+        raise ZeroDivisionError
+    assert not lock.exists()
+
+
+@posix
+def test_many_runs_take_a_lock_in_turn(tmp_path):
+    """Each adds one to a number that only the holder may touch; taken over from a kill."""
+    code = (
+        "import sys, time, pathlib\n"
+        "from greybed.core import OutputError\n"
+        "from greybed.core.files import sole_writer\n"
+        "number = pathlib.Path('number')\n"
+        "for _ in range(40):\n"
+        "    while True:\n"
+        "        try:\n"
+        "            with sole_writer('.lock'):\n"
+        "                n = int(number.read_text())\n"
+        "                time.sleep(0.0005)\n"
+        "                number.write_text(str(n + 1))\n"
+        "            break\n"
+        "        except OutputError:\n"
+        "            time.sleep(0.0005)\n"
+    )
+    (tmp_path / "number").write_text("0")
+    runs = [subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path) for _ in range(3)]
+    assert [run.wait(60) for run in runs] == [0, 0, 0]
+    assert (tmp_path / "number").read_text() == "120"
+
+
+CHAIN = (
+    "pack --count 300 --fraction 0.55 --sizes lognormal:1mm,1.3 --shake 5 --seed 3 --out o/p.h5",
+    "trace o/p.h5 --rays 400 --seed 2 --quiet --out o",
+    "dataset viewfactor long.toml --out o/d.h5",
+    "train viewfactor o/d.h5 --epochs 2 --name mlp --out o",
+    "train viewfactor o/d.h5 --model forest --name forest --out o",
+    "export o/mlp.closure --to cpp,onnx --name mlp --out o",
+    "export o/forest.closure --to cpp,onnx --name forest --out o",
+)
+
+
+def test_threads_change_no_bit(tmp_path):
+    """The whole chain in fresh processes, on one processor and on all, with one thread and two."""
+    split = DESIGN.replace("6000", "1000").split("[[packing]]")
+    names = ["", "", "train", "calibrate", "test"]
+    design = "[[packing]]".join(
+        part + (f'split = "{name}"\n' if name else "")
+        for part, name in zip(split[:5], names, strict=True)
+    )
+    code = "from greybed.cli import main\n" + "\n".join(
+        f"assert main({words.split()}) == 0" for words in CHAIN
+    )
+    one = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+    two = {"OMP_NUM_THREADS": "2", "NUMBA_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2"}
+    pin = "import os\nif hasattr(os, 'sched_setaffinity'):\n    os.sched_setaffinity(0, {})\n"
+    pinned = pin.format("[min(os.sched_getaffinity(0))]") + code
+    hashes = []
+    for number, (program, environment) in enumerate(((pinned, one), (code, two))):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        (folder / "long.toml").write_text(design)
+        subprocess.run(
+            [sys.executable, "-c", program],
+            cwd=folder,
+            # No compiler: its programs are no results, and compiling takes longest.
+            env={**os.environ, **environment, "CXX": "/nowhere/g++"},
+            check=True,
+            capture_output=True,
+        )
+        hashes.append({p.name: sha(p) for p in (folder / "o").iterdir() if p.suffix != ".json"})
+    assert {"p.h5", "view_factors.h5", "d.h5", "mlp.closure", "forest.closure"} < set(hashes[0])
+    assert {"mlp.hpp", "mlp.onnx", "forest.hpp", "forest.onnx"} < set(hashes[0])
+    assert hashes[0] == hashes[1]

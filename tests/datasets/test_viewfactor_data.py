@@ -1,0 +1,140 @@
+"""View-factor data sets: rows against the trace, thinning, splits, resuming, broken files."""
+
+import numpy as np
+import pytest
+
+from greybed.core import InputError
+from greybed.datasets import viewfactor
+from greybed.datasets.generate import random_packing
+from greybed.datasets.sizes import LogNormal
+from greybed.datasets.viewfactor import (
+    COLUMNS,
+    Design,
+    PackingDesign,
+    default_design,
+    generate,
+    reach_of,
+    read,
+    rows_of,
+)
+from greybed.raytrace import view_factors
+
+SMALL = Design(
+    packing=tuple(
+        PackingDesign(fraction=0.3 + 0.1 * k, count=60, shake=20, split=split)
+        for k, split in enumerate(("train", "calibrate", "test"))
+    ),
+    rays=3000,
+    emitters=10,
+)
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    path = tmp_path_factory.mktemp("data") / "small.h5"
+    return generate(SMALL, path), path
+
+
+def test_rows_add_up_to_the_trace():
+    """All images of all pairs in reach, weighted, hold what one row of the trace holds."""
+    packing = random_packing(150, 0.5, LogNormal(1e-3, 1.2), seed=3, shake=20)
+    columns = rows_of(packing, 150, 4000, seed=5)
+    traced = view_factors(packing, rays=4000, seed=5)
+    total = (columns["factor"] * columns["weight"]).sum()
+    # Thinned rows are faint: their random share moves the sum by a per mille; the reach leaves
+    # out pairs expected below 5e-5.
+    assert total == pytest.approx(traced.factors.sum(), rel=0.01)
+    assert (columns["factor"] <= columns["exact"] + 6 * columns["stderr"]).all()
+
+
+def test_thinning_looks_at_the_geometry_only():
+    packing = random_packing(150, 0.5, LogNormal(1e-3, 1.2), seed=3, shake=20)
+    few, many = rows_of(packing, 40, 500, seed=5), rows_of(packing, 40, 5000, seed=5)
+    np.testing.assert_array_equal(few["exact"], many["exact"])
+    np.testing.assert_array_equal(few["weight"], many["weight"])
+
+
+def test_reach_holds_what_can_be_seen():
+    packing = random_packing(400, 0.4, LogNormal(1e-3, 1.1), seed=1)
+    reach = reach_of(packing)
+    assert 5e-3 < reach < 30e-3
+    assert reach_of(packing, least=1e-3) < reach
+
+
+def test_round_trip(data):
+    made, path = data
+    again = read(path)
+    assert again.digest == made.digest
+    for name in COLUMNS:
+        np.testing.assert_array_equal(again.columns[name], made.columns[name])
+    assert [p["split"] for p in again.packings] == ["train", "calibrate", "test"]
+
+
+def test_splits_are_whole_packings(data):
+    made, _ = data
+    for split, number in (("train", 0), ("calibrate", 1), ("test", 2)):
+        assert set(made.packing[made.in_split(split)]) == {number}
+
+
+def test_same_seed_same_rows(data, tmp_path):
+    assert generate(SMALL, tmp_path / "again.h5").digest == data[0].digest
+
+
+def test_finished_packings_are_not_made_again(data, tmp_path, monkeypatch):
+    """A run that dies in its third packing continues with the third."""
+    made: list[int] = []
+    real = viewfactor.rows_of
+
+    def failing(packing, emitters, rays, seed):
+        if len(made) == 2:
+            raise KeyboardInterrupt
+        made.append(seed)
+        return real(packing, emitters, rays, seed)
+
+    monkeypatch.setattr(viewfactor, "rows_of", failing)
+    with pytest.raises(KeyboardInterrupt):
+        generate(SMALL, tmp_path / "a.h5")
+    assert not (tmp_path / "a.h5").exists()
+    made.clear()
+    monkeypatch.setattr(viewfactor, "rows_of", lambda *a: (made.append(a[3]), real(*a))[1])
+    assert generate(SMALL, tmp_path / "a.h5").digest == data[0].digest
+    assert len(made) == 1
+    assert not (tmp_path / "a.h5.parts").exists()
+
+
+def test_default_design_covers_what_it_promises():
+    design = default_design()
+    fractions = [p.fraction for p in design.packing]
+    assert min(fractions) == 0.10
+    assert max(fractions) >= 0.60
+    assert {p.sizes.split(":")[0] for p in design.packing} == {"mono", "lognormal", "discrete"}
+    assert {p.split for p in design.packing} == {"train", "calibrate", "test"}
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.9, 0.999])
+def test_truncated(data, tmp_path, share):
+    broken = tmp_path / "broken.h5"
+    content = data[1].read_bytes()
+    broken.write_bytes(content[: int(share * len(content))])
+    with pytest.raises(InputError, match=r"broken\.h5: .*(again|make one)"):
+        read(broken)
+
+
+def test_changed_value(data, tmp_path):
+    import h5py
+
+    changed = tmp_path / "changed.h5"
+    changed.write_bytes(data[1].read_bytes())
+    with h5py.File(changed, "r+") as file:
+        file["factor"][3] += 0.01
+    with pytest.raises(InputError, match=r"changed\.h5: the data do not match their SHA-256"):
+        read(changed)
+
+
+def test_another_hdf5(tmp_path):
+    import h5py
+
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["x"] = 1.0
+    with pytest.raises(InputError, match="not a view-factor data set"):
+        read(tmp_path / "other.h5")
