@@ -1,0 +1,209 @@
+"""What could explain a residual: named effects, powers of a covariate, offsets of a label."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from greybed.residual.effect import Effect
+from greybed.residual.problem import Problem
+
+Array = NDArray[np.float64]
+
+# Prior shares of what may be missing from a model, all terms of a kind together: named effects
+# first, then covariates that the model does not use, faulty labels, and last an unnamed law in a
+# covariate that the model does use.
+SHARE = {"effect": 0.60, "outside": 0.18, "label": 0.18, "inside": 0.04}
+EXPONENTS = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
+POWER_SD = 0.5  # prior size of an unnamed dependence, of the transformed response
+LABEL_SD = 0.3  # prior size of an offset
+OFF_THEORY = 0.05  # prior share of amplitudes that theory does not foresee
+OFF_SPREAD = 0.8  # and their relative spread
+ATOMS_PER_DECADE = 2.0
+
+
+@dataclass(frozen=True)
+class Atom:
+    """One column with a Gaussian prior of its coefficient: a piece of a term."""
+
+    column: Array  # (n,)
+    mean: float
+    sd: float
+    log_weight: float
+    exponent: float = 0.0
+
+
+@dataclass(frozen=True)
+class Term:
+    """One candidate explanation.
+
+    Attributes
+    ----------
+    kind : str
+        ``effect``, ``outside`` or ``inside`` (power of a covariate), ``label``.
+    name : str
+        Effect, covariate or ``label=value``.
+    log_prior : float
+        Logarithm of the prior share.
+    atoms : tuple of Atom
+        Columns at the typical amplitude, in units of it.
+    effect : Effect or None
+        For kind ``effect``.
+    basis : ndarray (n,) or None
+        Covariate over its geometric mean, or the label's indicator.
+    centre : float
+        That geometric mean, or the root mean square where the covariate is not positive.
+    linear : bool
+        The covariate is not positive everywhere, so it has no powers but 1 and 2.
+    """
+
+    kind: str
+    name: str
+    log_prior: float
+    atoms: tuple[Atom, ...]
+    effect: Effect | None = None
+    basis: Array | None = None
+    centre: float = 1.0
+    linear: bool = False
+
+    @property
+    def size(self) -> int:
+        """Coefficients of a nonlinear fit: an exponent besides the amplitude for a power."""
+        return 2 if self.kind in ("outside", "inside") and not self.linear else 1
+
+    def on(self, problem: Problem) -> Array:
+        """The basis on the rows of a problem, shape (n,)."""
+        if self.kind == "label":
+            name, value = self.name.split("=", 1)
+            return np.array([word == value for word in problem.labels[name]], dtype=np.float64)
+        return problem.columns[self.name] / self.centre
+
+
+def effect_column(problem: Problem, t: Array, effect: Effect, amplitude: float) -> Array:
+    """Change of the transformed prediction per unit of ``amplitude`` / typical, shape (n,)."""
+    change = problem.predict(t, {effect.name: amplitude}) - problem.predict(t, {})
+    return change / (amplitude / effect.typical)
+
+
+def _effect_atoms(problem: Problem, t: Array, effect: Effect) -> tuple[Atom, ...]:
+    if effect.theory is not None:
+        column = effect_column(problem, t, effect, effect.theory)
+        if not np.isfinite(column).all():
+            return ()
+        return (
+            Atom(column, 1.0, 1.2 * effect.spread, float(np.log(1.0 - OFF_THEORY))),
+            Atom(column, 1.0, OFF_SPREAD, float(np.log(OFF_THEORY))),
+        )
+    small, large = sorted((abs(effect.low), abs(effect.high)))
+    small = max(small, 1e-3 * large)
+    count = max(2, int(np.ceil(ATOMS_PER_DECADE * np.log10(large / small))) + 1)
+    sign = 1.0 if effect.low + effect.high > 0.0 else -1.0
+    atoms = []
+    width = np.log(large / small) / count
+    for k in range(count):
+        size = small * float(np.exp(width * (k + 0.5)))
+        column = effect_column(problem, t, effect, sign * size)
+        if np.isfinite(column).all():
+            scaled = sign * size / effect.typical
+            atoms.append(Atom(column, scaled, 0.6 * width * scaled, -float(np.log(count))))
+    return tuple(atoms)
+
+
+def power(basis: Array, exponent: float, reference: Array | None = None) -> Array:
+    """basis^exponent over its root mean square on ``reference``; exponent 0 is the logarithm."""
+    reference = basis if reference is None else reference
+    if exponent == 0.0:  # the geometric mean of the reference is 1, so its logarithms average 0
+        return np.log(basis) / max(float(np.sqrt(np.mean(np.log(reference) ** 2))), 1e-300)
+    return basis**exponent / max(float(np.sqrt(np.mean(reference ** (2.0 * exponent)))), 1e-300)
+
+
+def _power_term(kind: str, name: str, values: Array, log_prior: float) -> Term:
+    if not (values > 0.0).all():
+        # powers need positive numbers
+        centre = float(np.sqrt(np.mean(values**2)))
+        atoms = (Atom(values / centre, 0.0, POWER_SD, 0.0, 1.0),)
+        return Term(kind, name, log_prior, atoms, None, values / centre, centre, True)
+    centre = float(np.exp(np.mean(np.log(values))))
+    basis = values / centre
+    share = -float(np.log(len(EXPONENTS)))
+    atoms = tuple(Atom(power(basis, n), 0.0, POWER_SD, share, n) for n in EXPONENTS)
+    return Term(kind, name, log_prior, atoms, None, basis, centre)
+
+
+def _label_values(problem: Problem) -> list[tuple[str, str, Array]]:
+    found = []
+    names = [*problem.study.labels, *problem.labels]
+    for name in dict.fromkeys(names):
+        words = np.array(problem.labels[name])
+        values, counts = np.unique(words, return_counts=True)
+        if len(values) < 2 or len(values) > len(words) // 2:
+            continue
+        for value, count in zip(values, counts, strict=True):
+            # the odd one out is in the minority; of two values each may be the faulty one
+            if 2 <= count <= len(words) - 2 and (count <= len(words) / 2 or len(values) == 2):
+                found.append((name, str(value), (words == value).astype(np.float64)))
+    return found
+
+
+def terms(problem: Problem, t: Array) -> tuple[list[Term], dict[str, str]]:
+    """All terms that the columns allow, linearised at internal coordinates ``t``.
+
+    Parameters
+    ----------
+    problem : Problem
+        Rows and model.
+    t : ndarray (p,)
+        Parameters to linearise at.
+
+    Returns
+    -------
+    terms : list of Term
+        Named effects first.
+    failed : dict of str to str
+        Effects that the model cannot evaluate on these rows, with the reason.
+    """
+    wanted = problem.study.options.candidates
+    effects: Mapping[str, Effect] = problem.model.effects
+    chosen = [e for e in effects.values() if wanted is None or e.name in wanted]
+    found: list[Term] = []
+    failed: dict[str, str] = {}
+    made = {}
+    for effect in chosen:
+        atoms = _effect_atoms(problem, t, effect)
+        if not atoms:
+            failed[effect.name] = "the model gives no number with it on some rows"
+        elif max(float(np.abs(a.column).max()) for a in atoms) < 1e-12:
+            failed[effect.name] = "it changes nothing at these conditions"
+        else:
+            made[effect.name] = (effect, atoms)
+    for name, (effect, atoms) in made.items():
+        prior = float(np.log(SHARE["effect"] / len(made)))
+        found.append(Term("effect", name, prior, atoms, effect=effect))
+    covariates = problem.covariates()
+    known = _used_columns(problem)
+    for kind in ("outside", "inside"):
+        names = [n for n in covariates if (n in known) == (kind == "inside")]
+        for name in names:
+            prior = float(np.log(SHARE[kind] / len(names)))
+            found.append(_power_term(kind, name, covariates[name], prior))
+    labels = _label_values(problem)
+    for name, value, indicator in labels:
+        prior = float(np.log(SHARE["label"] / len(labels)))
+        atom = Atom(indicator, 0.0, LABEL_SD, 0.0)
+        found.append(Term("label", f"{name}={value}", prior, (atom,), basis=indicator))
+    return found, failed
+
+
+def _used_columns(problem: Problem) -> set[str]:
+    """Covariates that the base model or a candidate effect depends on."""
+    used = {name for effect in problem.model.effects.values() for name in effect.columns}
+    t = np.zeros(len(problem.names))
+    base = problem.predict(t, {})
+    for name, column in problem.columns.items():
+        changed = problem.predict(t, {}, {**problem.columns, name: column * 1.01})
+        if not np.array_equal(base, changed, equal_nan=True):
+            used.add(name)
+    return used
