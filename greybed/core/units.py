@@ -24,6 +24,7 @@ DIMENSIONS = {
     "density": ("kg/m**3", "kg/m3 or g/cm3"),
     "force": ("N", "N or mN"),
     "pressure": ("Pa", "Pa, kPa or bar"),
+    "pressure gradient": ("Pa/m", "Pa/m or kPa/m"),
     "viscosity": ("Pa*s", "Pa s or mPa s"),
     "power": ("W", "W or mW"),
     "heat flux": ("W/m**2", "W/m2 or kW/m2"),
@@ -160,4 +161,74 @@ def parse_quantity(text: str, dimension: str, where: str = "value") -> float:
     value = float(to_si(number, match[2], dimension, where))
     if not np.isfinite(value):
         raise InputError(f"{where}: {_shown(text)} is not finite; give a finite {dimension}.")
+    return value
+
+
+def to_base(values: ArrayLike, unit: str, where: str) -> tuple[NDArray[np.float64], str]:
+    """Convert numbers of any dimension to base SI.
+
+    Parameters
+    ----------
+    values : array_like, any shape
+        Numbers in ``unit``.
+    unit : str
+        Any unit; empty or ``-`` for pure numbers.
+    where : str
+        Place named in an error.
+
+    Returns
+    -------
+    converted : ndarray, shape of ``values``
+        Numbers in base SI.
+    base : str
+        Their unit, such as ``kg/m/s2``; empty for pure numbers.
+
+    Raises
+    ------
+    InputError
+        If the unit is not known.
+    """
+    array = np.array(values, dtype=np.float64)
+    text = unit.strip()
+    if text in ("", "-", "1"):
+        return array, ""
+    unknown = f"{where}: unit {_shown(text)} is not known; write it like mm, m/s or kg/m3."
+    if len(text) > _LONGEST or not _UNIT.fullmatch(text):
+        raise InputError(unknown)
+    import pint
+
+    plain = _FACTOR.sub(r"\1**\2", text.replace("·", "*"))
+    try:
+        registry = _registry()
+        quantity = registry.Quantity(array, registry.parse_units(plain)).to_base_units()
+    except (
+        pint.PintError,
+        ArithmeticError,
+        AttributeError,
+        LookupError,
+        SyntaxError,
+        TypeError,
+        ValueError,
+    ):
+        raise InputError(unknown) from None
+    base = f"{quantity.units:~C}".replace("**", "")
+    return np.asarray(quantity.magnitude, dtype=np.float64), base
+
+
+def parse_to_base(text: str, where: str = "value") -> float:
+    """Read one number with any unit into base SI.
+
+    Raises
+    ------
+    InputError
+        If the text is not a finite number with a known unit.
+    """
+    match = _QUANTITY.fullmatch(text)
+    if match is None:
+        raise InputError(
+            f"{where}: {_shown(text)} is not a number with a unit; write it like '1.5 mm'."
+        )
+    value = float(to_base(float(match[1]), match[2], where)[0])
+    if not np.isfinite(value):
+        raise InputError(f"{where}: {_shown(text)} is not finite; give a finite number.")
     return value

@@ -1,4 +1,4 @@
-"""From ranked sets to a verdict: the smallest adequate set, and what the data cannot tell from it."""
+"""From ranked sets to a verdict: the smallest adequate set, and what cannot be told from it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What would have been seen: the smallest amplitude of each effect that a clean verdict excludes."""
+"""What would have been seen: the smallest amplitude of each effect that "none" excludes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An effect that a model may lack: its form, its amplitude from theory, what it needs, its switch."""
+"""An effect that a model may lack: form, amplitude from theory, what it needs, its switch."""
 
 from __future__ import annotations
 

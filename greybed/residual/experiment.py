@@ -44,7 +44,7 @@ def experiment(problem: Problem, rivals: tuple[Fit, ...], seed: int) -> dict[str
     distance = np.zeros(TRIALS)
     for i, (first, spread) in enumerate(outcomes):
         for second, other in outcomes[i + 1 :]:
-            noise = rivals[0].sigma**2 + rivals[0].tau ** 2
+            noise = rivals[0].sigma ** 2 + rivals[0].tau ** 2
             apart = np.abs(first - second) / np.sqrt(spread**2 + other**2 + noise)
             distance = np.maximum(distance, np.where(np.isfinite(apart), apart, 0.0))
     best = int(np.argmax(distance))
@@ -123,5 +123,3 @@ def _predictions(problem: Problem, made: Fit, trials: dict[str, Array]) -> tuple
         slopes[:, j] = (at(moved) - centre) / step
     variance = np.einsum("ij,jk,ik->i", slopes, made.covariance, slopes)
     return centre, np.sqrt(np.maximum(variance, 0.0))
-
-

@@ -135,7 +135,7 @@ def _prior(problem: Problem, terms: tuple[Term, ...], u: Array, flat: int | None
         if term.kind == "effect":
             assert term.effect is not None
             if term.effect.theory is not None:
-                sds = np.array([1.2 * term.effect.spread, OFF_SPREAD])
+                sds = np.array([term.effect.spread, OFF_SPREAD])
                 logs = np.log([1.0 - OFF_THEORY, OFF_THEORY])
                 logs = logs + stats.norm.logpdf(u[k], 1.0, sds)
                 total = float(np.logaddexp(*logs))
@@ -237,7 +237,8 @@ def fit(
         score = constant - 0.5 * gram[..., 0, 0] + gain
         if len(u):
             score = score - 0.5 * np.linalg.slogdet(inner)[1]
-        point = np.unravel_index(int(np.argmax(score)), score.shape)
+        best = np.unravel_index(int(np.argmax(score)), score.shape)
+        point = (int(best[0]), int(best[1]))
         if not len(u):
             converged = True
             break
@@ -267,7 +268,7 @@ def _cost(
     terms: tuple[Term, ...],
     u: Array,
     centre: Array,
-    point: tuple[int, ...],
+    point: tuple[int, int],
     flat: int | None,
 ) -> float:
     e = grid.vectors[point[0]].T @ ((problem.z - centre) / np.sqrt(grid.weight))
@@ -284,7 +285,7 @@ def _advance(
     u: Array,
     centre: Array,
     step: Array,
-    point: tuple[int, ...],
+    point: tuple[int, int],
     flat: int | None,
 ) -> tuple[Array, Array, bool]:
     """A step that lowers the cost, halved until it does."""

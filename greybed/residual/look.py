@@ -115,9 +115,7 @@ def look(problem: Problem, reuse: Screened | None = None) -> Look:
     screened = reuse or screen(
         residual, slopes, precision, systematic, group, candidates, _courses(problem, t), stated
     )
-    candidates, unseen = _identifiable(
-        candidates, slopes, precision, systematic, screened
-    )
+    candidates, unseen = _identifiable(candidates, slopes, precision, systematic, screened)
     hidden.update(unseen)
     keep = ~screened.outlier
     problem = problem.take(keep)

@@ -1,4 +1,4 @@
-"""A study as numbers: rows that can be used, transformed responses, parameters, error directions."""
+"""A study as numbers: usable rows, transformed responses, parameters, directions of errors."""
 
 from __future__ import annotations
 

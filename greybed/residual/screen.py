@@ -44,9 +44,7 @@ class Screened:
     varies_with: str | None
 
 
-def _flexible(
-    nuisance: Array, precision: Array, systematic: Array, terms: list[Term]
-) -> Array:
+def _flexible(nuisance: Array, precision: Array, systematic: Array, terms: list[Term]) -> Array:
     """Prior covariance of a residual in which every term may be present."""
     covariance = systematic + (nuisance / precision) @ nuisance.T
     for term in terms:
@@ -59,16 +57,18 @@ def _flexible(
 class _Smoother:
     """The flexible model fitted to some of the rows: random error by maximum likelihood."""
 
-    def __init__(self, structure: Array, same: Array | None, residual: Array, sigmas: Array) -> None:
+    def __init__(
+        self, structure: Array, same: Array | None, residual: Array, sigmas: Array
+    ) -> None:
         self.structure, self.same, self.residual = structure, same, residual
-        self.sigmas = sigmas
+        self.sigmas: Array = sigmas
 
     def fit(self, keep: NDArray[np.bool_]) -> tuple[float, float]:
         """Random error and group share with the highest likelihood."""
         rows = np.flatnonzero(keep)
         base = self.structure[np.ix_(rows, rows)]
         r = self.residual[rows]
-        best = (-np.inf, float(self.sigmas[-1]), 0.0)
+        best: tuple[float, float, float] = (-np.inf, float(self.sigmas[-1]), 0.0)
         values, vectors = np.linalg.eigh(base)
         if self.same is None:
             y = vectors.T @ r
@@ -83,8 +83,8 @@ class _Smoother:
                 covariance = base + (share * sigma) ** 2 * same
                 covariance[np.diag_indices(len(rows))] += sigma**2
                 factor = np.linalg.cholesky(covariance)
-                y = np.linalg.solve(factor, r)
-                like = -0.5 * float(y @ y) - float(np.log(np.diag(factor)).sum())
+                white = np.linalg.solve(factor, r)
+                like = -0.5 * float(white @ white) - float(np.log(np.diag(factor)).sum())
                 best = max(best, (like, float(sigma), share))
         return best[1], best[2]
 
@@ -153,9 +153,7 @@ def screen(
     return Screened(~keep, weight, sigma, name)
 
 
-def _screened(
-    smoother: _Smoother, freedom: float
-) -> tuple[NDArray[np.bool_], Array, float] | None:
+def _screened(smoother: _Smoother, freedom: float) -> tuple[NDArray[np.bool_], Array, float] | None:
     """Rows to keep, their standardised deviations, and the random error.
 
     None where the random error is taken as known (infinite ``freedom``) and too many rows are off.

@@ -56,7 +56,9 @@ def _set_scores(scan: Scan, sets: NDArray[np.int64]) -> Array:
     return log_sum(total, axis=0) + scan.log_weight[sets].sum(axis=1)
 
 
-def screened_sets(scan: Scan, terms: list[Term], breadth: int) -> list[tuple[tuple[int, ...], Array]]:
+def screened_sets(
+    scan: Scan, terms: list[Term], breadth: int
+) -> list[tuple[tuple[int, ...], Array]]:
     """Sets of terms worth a nonlinear fit, with the atoms to start from.
 
     Parameters
@@ -100,9 +102,7 @@ def screened_sets(scan: Scan, terms: list[Term], breadth: int) -> list[tuple[tup
     # a set that only adds noise to a better one shows up beside it; leave room for other ideas
     chosen = order[:breadth]
     named = [
-        item
-        for item in order[breadth:]
-        if len(item[0]) == 1 and terms[item[0][0]].kind == "effect"
+        item for item in order[breadth:] if len(item[0]) == 1 and terms[item[0][0]].kind == "effect"
     ]
     return [(key, np.array(atoms)) for key, (_, atoms) in chosen + named[: breadth // 3]]
 

@@ -1,4 +1,4 @@
-"""A study: measured table, noise, model, parameters and options, as ``greybed diagnose`` reads it."""
+"""A study: measured table, noise, model, parameters and options."""
 
 from __future__ import annotations
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ POWER_SD = 0.5  # prior size of an unnamed dependence, of the transformed respon
 LABEL_SD = 0.3  # prior size of an offset
 OFF_THEORY = 0.05  # prior share of amplitudes that theory does not foresee
 OFF_SPREAD = 0.8  # and their relative spread
+DEFINES = 1e-4  # relative: closer than this, a column is part of the response's definition
 ATOMS_PER_DECADE = 2.0
 
 
@@ -94,7 +96,7 @@ def _effect_atoms(problem: Problem, t: Array, effect: Effect) -> tuple[Atom, ...
         if not np.isfinite(column).all():
             return ()
         return (
-            Atom(column, 1.0, 1.2 * effect.spread, float(np.log(1.0 - OFF_THEORY))),
+            Atom(column, 1.0, effect.spread, float(np.log(1.0 - OFF_THEORY))),
             Atom(column, 1.0, OFF_SPREAD, float(np.log(OFF_THEORY))),
         )
     small, large = sorted((abs(effect.low), abs(effect.high)))
@@ -124,8 +126,8 @@ def _power_term(kind: str, name: str, values: Array, log_prior: float) -> Term:
     if not (values > 0.0).all():
         # powers need positive numbers
         centre = float(np.sqrt(np.mean(values**2)))
-        atoms = (Atom(values / centre, 0.0, POWER_SD, 0.0, 1.0),)
-        return Term(kind, name, log_prior, atoms, None, values / centre, centre, True)
+        line = Atom(values / centre, 0.0, POWER_SD, 0.0, 1.0)
+        return Term(kind, name, log_prior, (line,), None, values / centre, centre, True)
     centre = float(np.exp(np.mean(np.log(values))))
     basis = values / centre
     share = -float(np.log(len(EXPONENTS)))
@@ -183,6 +185,9 @@ def terms(problem: Problem, t: Array) -> tuple[list[Term], dict[str, str]]:
         prior = float(np.log(SHARE["effect"] / len(made)))
         found.append(Term("effect", name, prior, atoms, effect=effect))
     covariates = problem.covariates()
+    for name in _definitions(problem, covariates):
+        del covariates[name]
+        failed[name] = "the response was computed from it"
     known = _used_columns(problem)
     for kind in ("outside", "inside"):
         names = [n for n in covariates if (n in known) == (kind == "inside")]
@@ -195,6 +200,28 @@ def terms(problem: Problem, t: Array) -> tuple[list[Term], dict[str, str]]:
         atom = Atom(indicator, 0.0, LABEL_SD, 0.0)
         found.append(Term("label", f"{name}={value}", prior, (atom,), basis=indicator))
     return found, failed
+
+
+def _definitions(problem: Problem, covariates: Mapping[str, Array]) -> tuple[str, ...]:
+    """Columns that the response was computed from, such as the distance and time of a velocity.
+
+    One or two columns whose powers give the response to far more digits than any measurement
+    repeats are its definition, and explain nothing.
+    """
+    used = _used_columns(problem)
+    names = [n for n, v in covariates.items() if n not in used and (v > 0.0).all()]
+    response = problem.columns[problem.study.response]
+    if not names or len(problem) < 8 or not (response > 0.0).all():
+        return ()
+    y = np.log(response) - np.log(response).mean()
+    for size in (1, 2):
+        for group in combinations(names, size):
+            x = np.column_stack([np.log(covariates[n]) for n in group])
+            x = x - x.mean(axis=0)
+            rest = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
+            if np.sqrt(np.mean(rest**2)) < DEFINES:
+                return group
+    return ()
 
 
 def _used_columns(problem: Problem) -> set[str]:

@@ -1,0 +1,88 @@
+"""Forward models by name; each is loaded when it is asked for."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from importlib import import_module
+
+from greybed.core.errors import InputError
+from greybed.residual.model import ForwardModel, ModelSpec
+from greybed.residual.study import Table
+
+MODELS = {
+    "terminal-velocity": ("terminal_velocity", "TerminalVelocity"),
+    "packed-bed-pressure-drop": ("packed_bed", "PackedBedPressureDrop"),
+    "bed-conductivity": ("bed_conductivity", "BedConductivity"),
+    "case": ("case", "CaseModel"),
+    "python": ("python", "PythonModel"),
+}
+
+# column or parameter -> key of greybed.core.units.DIMENSIONS
+DIMENSIONS = {
+    "diameter": "length",
+    "particle_diameter": "length",
+    "tube_diameter": "length",
+    "mean_free_path": "length",
+    "bed_length": "length",
+    "wall_distance": "length",
+    "fill_height": "length",
+    "silo_diameter": "length",
+    "cell_size": "length",
+    "velocity": "velocity",
+    "superficial_velocity": "velocity",
+    "impact_velocity": "velocity",
+    "particle_density": "density",
+    "fluid_density": "density",
+    "viscosity": "viscosity",
+    "temperature": "temperature",
+    "reference_temperature": "temperature",
+    "pressure": "pressure",
+    "outlet_pressure": "pressure",
+    "gas_pressure": "pressure",
+    "stress": "pressure",
+    "pressure_gradient": "pressure gradient",
+    "conductivity": "conductivity",
+    "solid_conductivity": "conductivity",
+    "gas_conductivity": "conductivity",
+    "void_fraction": "dimensionless",
+    "sphericity": "dimensionless",
+    "turbulence_intensity": "dimensionless",
+    "fines_fraction": "dimensionless",
+    "emissivity": "dimensionless",
+}
+
+
+def build(spec: ModelSpec, table: Table, parameters: Mapping[str, float]) -> ForwardModel:
+    """Make the forward model of a study.
+
+    Parameters
+    ----------
+    spec : ModelSpec
+        The table ``[model]``.
+    table : Table
+        Measured rows.
+    parameters : mapping of str to float
+        Parameters of the study in SI.
+
+    Returns
+    -------
+    model : ForwardModel
+        Ready to predict these rows.
+
+    Raises
+    ------
+    InputError
+        For a model, option, column or parameter that is unknown or missing.
+    """
+    if spec.name not in MODELS:
+        near = difflib.get_close_matches(spec.name, MODELS, n=1, cutoff=0.5)
+        hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(MODELS)}."
+        raise InputError(f"model.name = {spec.name!r} is not a known model; {hint}")
+    module, kind = MODELS[spec.name]
+    found = getattr(import_module(f"greybed.residual.models.{module}"), kind)
+    model: ForwardModel = found(spec, table, parameters)
+    return model
+
+
+__all__ = ["DIMENSIONS", "MODELS", "build"]

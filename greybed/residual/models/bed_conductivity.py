@@ -1,0 +1,67 @@
+"""Effective conductivity of a bed of spheres in a stagnant gas."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from greybed.closures.conductivity import zehner_schluender
+from greybed.core.errors import InputError
+from greybed.residual.effect import Array, Effect
+from greybed.residual.models.closed_form import LAW_KEYS, ClosedForm
+from greybed.residual.study import Table
+
+
+class BedConductivity(ClosedForm):
+    """Effective conductivity [W/m/K]: Zehner and Schluender's cell, without radiation."""
+
+    name = "bed-conductivity"
+    response = "conductivity"
+    required = (
+        "temperature",
+        "particle_diameter",
+        "void_fraction",
+        "solid_conductivity",
+        "gas_conductivity",
+    )
+    options = (*LAW_KEYS, "reference_temperature")
+    default_law = "zehner-schluender"
+
+    def _prepare(self, table: Table, parameters: Mapping[str, float]) -> None:
+        name = self.law.strip().lower().replace("_", "-").replace("ü", "ue")
+        if name not in ("zehner-schluender", "zbs", "zehner-bauer-schluender"):
+            raise InputError(
+                f"model.base = {self.law!r} is not a known law; take zehner-schluender."
+            )
+
+    def excluded(self, effect: Effect) -> str | None:
+        """Emissivity acts on radiation that the base already has."""
+        if effect.name == "emissivity" and "radiation" not in self.spec.effects:
+            return "the base has no radiation for it to act on; radiation itself takes it up"
+        return None
+
+    def complete(self, c: dict[str, Array]) -> dict[str, Array]:
+        """Radiative exchange: 1 for black spheres; radiation that is added takes emissivities."""
+        size = len(c["temperature"])
+        if "emissivity" in c and "radiation" not in self.spec.effects:
+            c["exchange"] = 1.0 / (2.0 / c["emissivity"] - 1.0)
+        else:
+            c["exchange"] = np.ones(size)
+        if "reference_temperature" in self.spec.options:
+            c["reference_temperature"] = np.full(
+                size, float(self.spec.options["reference_temperature"])
+            )
+        return c
+
+    def evaluate(self, columns: dict[str, Array], active: list[tuple[Effect, float]]) -> Array:
+        """The cell, and what runs beside it."""
+        c = columns
+        total = zehner_schluender(
+            c["solid_conductivity"], c["gas_conductivity"], c["void_fraction"]
+        )
+        for effect, amplitude in active:
+            changed = effect.change(c, amplitude)
+            assert not isinstance(changed, Mapping)
+            total = total + changed if effect.stage == "path" else total * changed
+        return total
