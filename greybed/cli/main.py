@@ -26,6 +26,7 @@ VERBS = {
     "check": ("check", "check a closure's limiting cases and golden rows"),
     "export": ("export", "export a closure to C++ or ONNX"),
     "simulate": ("simulate", "run a coupled case from a TOML file"),
+    "diagnose": ("diagnose", "trace a residual to the effect that a model lacks"),
 }
 
 

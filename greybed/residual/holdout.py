@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from greybed.residual.choice import choose
 from greybed.residual.diagnosis import Errors, Score
 from greybed.residual.discrepancy import Discrepancy
-from greybed.residual.fit import fit, predict
+from greybed.residual.fit import predict
 from greybed.residual.look import Look, look, recalibrated, without_hinge
 from greybed.residual.problem import FREE_SD, Problem
 from greybed.residual.search import NARROW, search
@@ -85,9 +85,9 @@ def hold_out(seen: Look, critical: float) -> HeldOut:
         if part.terms and part.statistic >= critical:
             found = search(part.problem, part.grid, part.scan, part.terms, part.t, NARROW)
             best = choose(part.problem, found).chosen
-        else:
-            best = fit(part.problem, part.grid, (), part.t)
-        out["effect"][test] = predict(rest, best.terms, best.u)
+            out["effect"][test] = predict(rest, best.terms, best.u)
+        else:  # nothing is missing: the base as it is, with its free parameters calibrated
+            out["effect"][test] = rest.predict(part.t, {})
     return HeldOut(out["base"], out["recalibrated"], out["effect"], out["gp"], fold, text)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ Array = NDArray[np.float64]
 FREE_SD = 2.0  # of the logarithm of a free parameter: within a factor of 50 either way
 STEP = 1e-4  # of finite differences, relative
 FEWEST_ROWS = 5
+FEWEST_TO_DEFINE = 8
+DEFINES = 1e-4  # relative: closer than this, a column is part of the response's definition
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,10 @@ class Problem:
         Of t: 1 where measured, ``FREE_SD`` where free.
     left_out : tuple of mappings
         Rows that cannot be used, with the reason.
+    used : frozenset of str
+        Columns that the base model depends on.
+    defining : tuple of str
+        Columns that the response was computed from; they explain nothing.
     """
 
     study: Study
@@ -60,6 +67,8 @@ class Problem:
     scale: Array
     prior_sd: Array
     left_out: tuple[Mapping[str, Any], ...] = ()
+    used: frozenset[str] = frozenset()
+    defining: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.z)
@@ -130,7 +139,7 @@ class Problem:
 
     def covariates(self) -> dict[str, Array]:
         """Numeric columns that vary, each (n,), without response and replicate counter."""
-        skip = {self.study.response, self.study.replicate}
+        skip = {self.study.response, self.study.replicate, *self.defining}
         return {
             name: column
             for name, column in self.columns.items()
@@ -234,5 +243,39 @@ def state(study: Study, model: ForwardModel) -> Problem:
             "measure more, or fix parameters."
         )
     z = np.log(response) if model.transform == "log" else response.copy()
-    problem = replace(problem, z=z)
-    return replace(problem.take(good), left_out=left_out)
+    problem = replace(problem, z=z, used=_used(problem, predicted))
+    problem = replace(problem.take(good), left_out=left_out)
+    return replace(problem, defining=_defining(problem))
+
+
+def _used(problem: Problem, base: Array) -> frozenset[str]:
+    """Columns that change the base model's prediction."""
+    t = np.zeros(len(problem.names))
+    used = set()
+    for name, column in problem.columns.items():
+        changed = problem.predict(t, {}, {**problem.columns, name: column * 1.01})
+        if not np.array_equal(base, changed, equal_nan=True):
+            used.add(name)
+    return frozenset(used)
+
+
+def _defining(problem: Problem) -> tuple[str, ...]:
+    """Columns that the response was computed from, such as the distance and time of a velocity.
+
+    One or two columns whose powers give the response to far more digits than any measurement
+    repeats are its definition.
+    """
+    covariates = problem.covariates()
+    names = [n for n, v in covariates.items() if n not in problem.used and (v > 0.0).all()]
+    response = problem.columns[problem.study.response]
+    if not names or len(problem) < FEWEST_TO_DEFINE or not (response > 0.0).all():
+        return ()
+    y = np.log(response) - np.log(response).mean()
+    for size in (1, 2):
+        for group in combinations(names, size):
+            x = np.column_stack([np.log(covariates[n]) for n in group])
+            x = x - x.mean(axis=0)
+            rest = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
+            if np.sqrt(np.mean(rest**2)) < DEFINES:
+                return group
+    return ()

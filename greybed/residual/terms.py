@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +22,6 @@ POWER_SD = 0.5  # prior size of an unnamed dependence, of the transformed respon
 LABEL_SD = 0.3  # prior size of an offset
 OFF_THEORY = 0.05  # prior share of amplitudes that theory does not foresee
 OFF_SPREAD = 0.8  # and their relative spread
-DEFINES = 1e-4  # relative: closer than this, a column is part of the response's definition
 ATOMS_PER_DECADE = 2.0
 
 
@@ -185,10 +183,7 @@ def terms(problem: Problem, t: Array) -> tuple[list[Term], dict[str, str]]:
         prior = float(np.log(SHARE["effect"] / len(made)))
         found.append(Term("effect", name, prior, atoms, effect=effect))
     covariates = problem.covariates()
-    for name in _definitions(problem, covariates):
-        del covariates[name]
-        failed[name] = "the response was computed from it"
-    known = _used_columns(problem)
+    known = {*problem.used, *(c for e in effects.values() for c in e.columns)}
     for kind in ("outside", "inside"):
         names = [n for n in covariates if (n in known) == (kind == "inside")]
         for name in names:
@@ -200,37 +195,3 @@ def terms(problem: Problem, t: Array) -> tuple[list[Term], dict[str, str]]:
         atom = Atom(indicator, 0.0, LABEL_SD, 0.0)
         found.append(Term("label", f"{name}={value}", prior, (atom,), basis=indicator))
     return found, failed
-
-
-def _definitions(problem: Problem, covariates: Mapping[str, Array]) -> tuple[str, ...]:
-    """Columns that the response was computed from, such as the distance and time of a velocity.
-
-    One or two columns whose powers give the response to far more digits than any measurement
-    repeats are its definition, and explain nothing.
-    """
-    used = _used_columns(problem)
-    names = [n for n, v in covariates.items() if n not in used and (v > 0.0).all()]
-    response = problem.columns[problem.study.response]
-    if not names or len(problem) < 8 or not (response > 0.0).all():
-        return ()
-    y = np.log(response) - np.log(response).mean()
-    for size in (1, 2):
-        for group in combinations(names, size):
-            x = np.column_stack([np.log(covariates[n]) for n in group])
-            x = x - x.mean(axis=0)
-            rest = y - x @ np.linalg.lstsq(x, y, rcond=None)[0]
-            if np.sqrt(np.mean(rest**2)) < DEFINES:
-                return group
-    return ()
-
-
-def _used_columns(problem: Problem) -> set[str]:
-    """Covariates that the base model or a candidate effect depends on."""
-    used = {name for effect in problem.model.effects.values() for name in effect.columns}
-    t = np.zeros(len(problem.names))
-    base = problem.predict(t, {})
-    for name, column in problem.columns.items():
-        changed = problem.predict(t, {}, {**problem.columns, name: column * 1.01})
-        if not np.array_equal(base, changed, equal_nan=True):
-            used.add(name)
-    return used

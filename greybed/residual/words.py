@@ -27,6 +27,8 @@ def sentence(answer: Mapping[str, Any]) -> str:
     if verdict == "none":
         relative = answer["detectable"].get("relative", float("nan"))
         size = f"{relative:.2g}" if answer["transform"] == "linear" else f"{100 * relative:.2g} %"
+        if not relative > 0.0:
+            return "Nothing is missing that these rows show; no named effect was a candidate."
         return f"Nothing is missing: an effect of {size} of the response would have been seen."
     if verdict == "not-identifiable":
         return (
@@ -84,6 +86,11 @@ def remarks(
                 f"The amplitude of {effect.name} differs from theory ({theory:.3g}) by more than "
                 "its interval."
             )
+    if seen.problem.defining:
+        said.append(
+            f"The response was computed from {' and '.join(seen.problem.defining)}, so "
+            "they were left aside."
+        )
     constant = [
         name
         for name, column in study.table.columns.items()
