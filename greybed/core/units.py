@@ -200,7 +200,11 @@ def to_base(values: ArrayLike, unit: str, where: str) -> tuple[NDArray[np.float6
     plain = _FACTOR.sub(r"\1**\2", text.replace("·", "*"))
     try:
         registry = _registry()
-        quantity = registry.Quantity(array, registry.parse_units(plain)).to_base_units()
+        quantity = registry.Quantity(array, registry.parse_units(plain))
+        known = (base for name, (base, _) in DIMENSIONS.items() if name not in ("angle", ""))
+        same = (b for b in known if b and quantity.check(registry.parse_units(b)))
+        base = next(same, None)
+        quantity = quantity.to_base_units() if base is None else quantity.to(base)
     except (
         pint.PintError,
         ArithmeticError,
@@ -211,8 +215,8 @@ def to_base(values: ArrayLike, unit: str, where: str) -> tuple[NDArray[np.float6
         ValueError,
     ):
         raise InputError(unknown) from None
-    base = f"{quantity.units:~C}".replace("**", "")
-    return np.asarray(quantity.magnitude, dtype=np.float64), base
+    shown = f"{quantity.units:~C}" if base is None else base
+    return np.asarray(quantity.magnitude, dtype=np.float64), shown.replace("**", "")
 
 
 def parse_to_base(text: str, where: str = "value") -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,8 @@ def _check_heat(place: str, temperature: float | None, heat: str) -> None:
 
 
 HEAT = ("fixed", "adiabatic")
+MOST_REPEATS = 60  # of a solve whose conductivity depends on temperature
+SETTLED = 1e-8  # change of the temperatures at which it is done [K]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,6 +97,9 @@ class MaterialTable:
     stiffness_ratio: float = quantity("dimensionless", 1.0, above=0.0)  # real over simulated [-]
     touching_gap: float = quantity("length", 0.0, at_least=0.0)  # [m]
     wall_conductivity: float | None = quantity("conductivity", None, above=0.0)  # None: isothermal
+    # conductivity * (reference_temperature / T)^exponent; 1 is phonon scattering in ceramics
+    conductivity_exponent: float = quantity("dimensionless", 0.0, at_least=-3.0, at_most=3.0)
+    reference_temperature: float = quantity("temperature", 300.0, above=0.0)  # [K]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,6 +109,7 @@ class RadiationTable:
     source: str = choice(("traced", "closure", "off"))
     rays: int = whole(10_000, at_least=1)  # per sphere, for traced [-]
     seed: int = whole(0, at_least=0)
+    strength: float = quantity("dimensionless", 1.0, above=0.0)  # on the exchange; 1 is physics
     closure: Path | None = None  # relative to the case, for closure
 
     def __post_init__(self) -> None:
@@ -209,7 +215,8 @@ def view_factors(
         result = raytrace.view_factors(
             packing, rays=radiation.rays, seed=radiation.seed, threads=threads, show_progress=show
         )
-    return Rows.of(result, packing)
+    rows = Rows.of(result, packing)
+    return replace(rows, areas=rows.areas * radiation.strength)
 
 
 def run_case(
@@ -262,17 +269,29 @@ def run_case(
         stiffness_ratio=m.stiffness_ratio,
         touching_gap=m.touching_gap,
     )
-    bed = ThermalBed(
-        packing,
-        rows,
-        material=material,
-        wall_temperatures=[w.temperature for w in case.wall],
-        environment_temperature=None if opening is None else opening.temperature,
-        conduction=solve.conduction,
-        wall_conductivity=math.inf if m.wall_conductivity is None else m.wall_conductivity,
-    )
+
+    def build(material: Material) -> ThermalBed:
+        return ThermalBed(
+            packing,
+            rows,
+            material=material,
+            wall_temperatures=[w.temperature for w in case.wall],
+            environment_temperature=None if opening is None else opening.temperature,
+            conduction=solve.conduction,
+            wall_conductivity=math.inf if m.wall_conductivity is None else m.wall_conductivity,
+        )
+
+    bed = build(material)
     if solve.mode == "steady":
-        return bed, bed.steady(initial_temperature=solve.initial_temperature)
+        result = bed.steady(initial_temperature=solve.initial_temperature)
+        if m.conductivity_exponent == 0.0:
+            return bed, result
+        return _variable_conductivity(m, material, build, result)
+    if m.conductivity_exponent != 0.0:
+        raise InputError(
+            f"material.conductivity_exponent = {m.conductivity_exponent:g} [-] works with "
+            'solve.mode = "steady" only; leave it out or set that mode.'
+        )
     assert solve.duration is not None  # checked by SolveTable
     assert solve.initial_temperature is not None
     result = bed.run(
@@ -283,6 +302,27 @@ def run_case(
         on_progress=on_progress,
     )
     return bed, result
+
+
+def _variable_conductivity(
+    m: MaterialTable,
+    material: Material,
+    build: Callable[[Material], ThermalBed],
+    result: ThermalResult,
+) -> tuple[ThermalBed, ThermalResult]:
+    """Repeat the steady solve with each sphere's conductivity at its own temperature."""
+    for _ in range(MOST_REPEATS):
+        before = result.temperatures
+        course = (m.reference_temperature / before) ** m.conductivity_exponent
+        bed = build(replace(material, conductivity=m.conductivity * course))
+        result = bed.steady(initial_temperature=before)
+        if np.max(np.abs(result.temperatures - before)) < SETTLED:
+            return bed, result
+    raise InputError(
+        f"the temperatures still move by {np.max(np.abs(result.temperatures - before)):.2g} K "
+        f"after {MOST_REPEATS} repeats with material.conductivity_exponent = "
+        f"{m.conductivity_exponent:g} [-]; take a smaller one."
+    )
 
 
 def summary(case: ThermalCase, bed: ThermalBed, result: ThermalResult) -> dict[str, Any]:

@@ -56,6 +56,11 @@ def diagnose(study: Study, show: bool = False) -> Diagnosis:
     began = time.perf_counter()
     values = {name: item.value for name, item in study.parameters.items()}
     model = build(study.model, study.table, values)
+    if model.response and model.response != study.response:
+        raise InputError(
+            f"{study.file or 'study'}: data.response = {study.response!r}, and the model "
+            f"{model.name} predicts {model.response}; take that column, or another model."
+        )
     _check_candidates(study, {*model.effects, *model.unavailable})
     with progress(STAGES, "diagnosing", show=show) as advance:
         whole = state(study, model)
@@ -146,6 +151,7 @@ def _answer(
         "left_out": _left_out(study, whole, seen),
         "transform": problem.model.transform,
         "model": problem.model.settings(problem.parameters(final.u[:p]), switched),
+        "case": problem.model.next_case(problem.parameters(final.u[:p]), switched),
         "rows": _rows(study, whole, seen, final, held),
     }
     answer["remarks"] = remarks(study, seen, choice, answer)

@@ -119,6 +119,7 @@ class Diagnosis:
     remarks: tuple[str, ...] = ()
     transform: str = "log"
     model: Mapping[str, Any] = field(default_factory=dict)  # [model] with the effect switched on
+    case: Mapping[str, Any] | None = None  # the simulation case with the effect switched on
     rows: Rows
     seconds: float
 
@@ -127,7 +128,7 @@ class Diagnosis:
         return {
             name: _plain(getattr(self, name))
             for name in self.__dataclass_fields__
-            if name not in ("rows", "model")
+            if name not in ("rows", "model", "case")
         }
 
 

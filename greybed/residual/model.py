@@ -89,6 +89,12 @@ class ForwardModel(ABC):
     ) -> dict[str, Any]:
         """The table ``[model]`` with the effects switched on: what the next run uses."""
 
+    def next_case(
+        self, parameters: Mapping[str, float], amplitudes: Mapping[str, float]
+    ) -> dict[str, Any] | None:
+        """A case file with the effects switched on, paths absolute; None where there is none."""
+        return None
+
 
 def values(columns: Columns, parameters: Mapping[str, float]) -> dict[str, Array]:
     """Columns with the parameters in place, each of shape (n,)."""

@@ -31,7 +31,7 @@ def write_diagnosis(folder: Path, study: Study, diagnosis: Diagnosis) -> dict[st
     Returns
     -------
     files : dict of str to Path
-        ``diagnosis``, ``residuals`` and ``model``.
+        ``diagnosis``, ``residuals`` and ``model``; ``case`` where the model is one.
     """
     files = {
         "diagnosis": write_json(folder / "diagnosis.json", diagnosis.to_json()),
@@ -42,7 +42,24 @@ def write_diagnosis(folder: Path, study: Study, diagnosis: Diagnosis) -> dict[st
     with atomic_path(files["model"]) as temporary, open(temporary, "wb") as stream:
         stream.write(f"# {diagnosis.sentence}\n".encode())
         tomli_w.dump(next_study(folder, study, diagnosis), stream)
+    if diagnosis.case is not None:
+        files["case"] = folder / "case_with_effect.toml"
+        with atomic_path(files["case"]) as temporary, open(temporary, "wb") as stream:
+            tomli_w.dump(_relative(diagnosis.case, folder.resolve()), stream)
     return files
+
+
+def _relative(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """The table with its absolute paths seen from ``folder``."""
+    out: dict[str, Any] = {}
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            out[key] = _relative(value, folder)
+        elif isinstance(value, str) and os.path.isabs(value):
+            out[key] = os.path.relpath(value, folder)
+        else:
+            out[key] = value
+    return out
 
 
 def _write_residuals(path: Path, study: Study, diagnosis: Diagnosis) -> None:
