@@ -27,6 +27,7 @@ VERBS = {
     "export": ("export", "export a closure to C++ or ONNX"),
     "simulate": ("simulate", "run a coupled case from a TOML file"),
     "diagnose": ("diagnose", "trace a residual to the effect that a model lacks"),
+    "blindtest": ("blindtest", "test the residual analysis on sealed data sets"),
 }
 
 

@@ -151,7 +151,7 @@ def _answer(
         "left_out": _left_out(study, whole, seen),
         "transform": problem.model.transform,
         "model": problem.model.settings(problem.parameters(final.u[:p]), switched),
-        "case": problem.model.next_case(problem.parameters(final.u[:p]), switched),
+        "case": problem.model.next_case(_next_parameters(problem, final), switched),
         "rows": _rows(study, whole, seen, final, held),
     }
     answer["remarks"] = remarks(study, seen, choice, answer)
@@ -210,6 +210,13 @@ def _shifts(problem: Problem, final: Fit) -> dict[str, Shift]:
             before=item.value, after=after[name], sd=sd, shift_sd=shift, free=item.free
         )
     return shifts
+
+
+def _next_parameters(problem: Problem, final: Fit) -> dict[str, float]:
+    """Measured parameters as measured, free ones as calibrated."""
+    after = problem.parameters(final.u[: len(problem.names)])
+    known = problem.study.parameters
+    return {name: after[name] if item.free else item.value for name, item in known.items()}
 
 
 def _ranking(problem: Problem, found: Search) -> tuple[Ranked, ...]:
