@@ -55,7 +55,8 @@ def library(folder: Path) -> tuple[list[str], Array, Array]:
 def best_subset(names: list[str], matrix: Array, residual: Array) -> list[str]:
     """The subset of up to three candidates with the lowest Bayesian information criterion."""
     n = len(residual)
-    best, chosen = n * np.log(np.mean(residual**2)), ()
+    best = n * np.log(np.mean(residual**2))
+    chosen: tuple[int, ...] = ()
     for size in range(1, min(MOST_TERMS, len(names)) + 1):
         for group in combinations(range(len(names)), size):
             x = matrix[:, group]

@@ -20,7 +20,6 @@ OUTSIDE_POWERS = (-1.0, -0.5, 0.5, 1.0, 1.5, 2.0)
 OUTSIDE_NAMES = ("humidity", "surface_charge", "surfactant", "running_time")
 SMALLEST_NOISE, LARGEST_NOISE = 0.003, 0.3
 ALIKE = 0.9  # cosine of two signatures from which a design is not called identifiable
-TWINS = 0.97  # cosine from which nobody could tell them apart
 PER_GROUP = 5
 
 

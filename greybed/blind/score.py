@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from greybed.blind.generate import ALIKE, TWINS
+from greybed.blind.generate import ALIKE
 
 Row = Mapping[str, Any]  # {"truth": ..., "found": ..., "competitors": ...}
 
 QUIET = ("none", "not-identifiable")
 EXPONENT = 0.2
+TENTH = 0.1
 
 
 @dataclass(frozen=True)
@@ -81,11 +82,18 @@ def twins(row: Row) -> bool:
     return bool(
         t["collinear"]
         and t["free"]
-        and t["alike"] >= TWINS
+        and _blurred(t)
         and t["ratio"] >= 0.95
         and t["n"] >= 40
         and t["kind"] == "one"
     )
+
+
+def _blurred(truth: Row) -> bool:
+    """Whether the rival's best fit differs from the truth by less than two standard errors, or by
+    less than a tenth of the effect, which is what published laws hold to."""
+    apart = math.sqrt(max(1.0 - truth["alike"] ** 2, 0.0))
+    return bool(apart < TENTH or apart * truth["ratio"] * math.sqrt(truth["n"]) < 2.0)
 
 
 def _share(
@@ -106,7 +114,8 @@ def _covered(row: Row) -> list[bool]:
     for effect in row["found"]["effects"]:
         name = effect["name"]
         truth = row["truth"]["effects"].get(name)
-        if truth is None or effect["theory"] is None or name not in row["truth"]["literal"]:
+        sealed = row["truth"]
+        if truth is None or name not in sealed["literal"] or name not in sealed["theory"]:
             continue
         low, high = sorted(end / effect["theory"] for end in effect["ci95"])
         hits.append(low <= truth["strength"] <= high)

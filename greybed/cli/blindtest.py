@@ -17,6 +17,10 @@ from greybed.core.errors import InputError
 
 KINDS = ("none", "one", "two", "outside", "hidden", "faulty")
 ALPHA = 0.01
+TRUTH = (
+    *("kind", "world", "n", "rho", "ratio", "collinear"),
+    *("free", "grouped", "declared", "uneven", "outliers", "alike"),
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
             raise InputError(f"--kinds: {kind!r} is not known; take some of {', '.join(KINDS)}.")
     folder = output_folder(options.out)
     asked = {"sets": options.sets, "seed": options.seed, "kinds": kinds}
-    with sole_writer(folder / "answers.bin"):
+    with sole_writer(folder / ".lock"):
         _check_same(folder, asked)
         rows = blind_test(
             folder,
@@ -129,20 +133,7 @@ def _markdown(card: Mapping[str, Any]) -> str:
 def _write_sets(path: Path, rows: list[dict[str, Any]]) -> None:
     with open(path, "w", newline="") as stream:
         writer = csv.writer(stream)
-        keys = [
-            "kind",
-            "world",
-            "n",
-            "rho",
-            "ratio",
-            "collinear",
-            "free",
-            "grouped",
-            "declared",
-            "uneven",
-            "outliers",
-            "alike",
-        ]
+        keys = [k for k in TRUTH if rows and k in rows[0]["truth"]]
         writer.writerow(["set", *keys, "truth", "verdict", "found", "p_value", "seconds"])
         for row in rows:
             truth, found = row["truth"], row["found"]

@@ -16,8 +16,9 @@ from greybed.residual.choice import Choice, choose
 from greybed.residual.detectable import detectable
 from greybed.residual.diagnosis import Dependence, Diagnosis, FoundEffect, Ranked, Rows, Shift
 from greybed.residual.experiment import experiment
-from greybed.residual.fit import Fit, amplitudes, fit, offsets
+from greybed.residual.fit import Fit, amplitudes, at_end, fit, offsets
 from greybed.residual.holdout import HeldOut, errors, hold_out
+from greybed.residual.interval import over_sets
 from greybed.residual.look import Look, existence, look, without_hinge
 from greybed.residual.problem import Problem, state
 from greybed.residual.search import Search, log_odds, search
@@ -134,7 +135,7 @@ def _answer(
     switched = amplitudes(final.terms, final.u, p)
     answer: dict[str, Any] = {
         "verdict": verdict,
-        "effects": _effects(seen, final),
+        "effects": _effects(seen, final, found),
         "rivals": rivals,
         "experiment": trial,
         "depends_on": depends,
@@ -173,10 +174,10 @@ def _verdict(seen: Look, choice: Choice | None) -> str:
     return "none" if named or not seen.hidden else "not-identifiable"
 
 
-def _effects(seen: Look, final: Fit) -> tuple[FoundEffect, ...]:
+def _effects(seen: Look, final: Fit, found: Search) -> tuple[FoundEffect, ...]:
     p = len(seen.problem.names)
     candidates = sum(term.kind == "effect" for term in seen.terms)
-    found = []
+    listed = []
     for term, k in zip(final.terms, offsets(final.terms, p), strict=True):
         if term.effect is None:
             continue
@@ -185,8 +186,8 @@ def _effects(seen: Look, final: Fit) -> tuple[FoundEffect, ...]:
         width = (ends[1] - ends[0]) / (2.0 * stats.norm.isf(0.025))
         # one-sided test of amplitude 0 with all other terms in, times the number of candidates
         p_value = candidates * float(stats.norm.sf(estimate / width))
-        low, high = sorted(float(end) * unit for end in ends)
-        found.append(
+        low, high = sorted(float(end) * unit for end in over_sets(seen, final, found, term))
+        listed.append(
             FoundEffect(
                 name=term.effect.name,
                 amplitude=float(final.u[k]) * unit,
@@ -195,7 +196,7 @@ def _effects(seen: Look, final: Fit) -> tuple[FoundEffect, ...]:
                 p_value=min(1.0, p_value),
             )
         )
-    return tuple(sorted(found, key=lambda effect: effect.p_value))
+    return tuple(sorted(listed, key=lambda effect: effect.p_value))
 
 
 def _shifts(problem: Problem, final: Fit) -> dict[str, Shift]:
@@ -229,10 +230,9 @@ def _ranking(problem: Problem, found: Search) -> tuple[Ranked, ...]:
         for term, k in zip(made.terms, offsets(made.terms, p), strict=True):
             unit = term.effect.typical if term.effect else 1.0
             sizes.append(float(made.u[k]) * unit)
-            if term.effect and not _within(term.effect, sizes[-1]):
-                remark = f"{term.name} stands at the end of the range that physics allows"
-            if not made.converged:
-                remark = "the fit did not settle"
+        end = at_end(made, p)
+        if end is not None:
+            remark = f"{end} stands at the end of the range that physics allows"
         ranked.append(
             Ranked(
                 names=made.names,
@@ -243,11 +243,6 @@ def _ranking(problem: Problem, found: Search) -> tuple[Ranked, ...]:
             )
         )
     return tuple(sorted(ranked, key=lambda item: -item.log_odds))
-
-
-def _within(effect: Any, amplitude: float) -> bool:
-    margin = 1e-6 * (effect.high - effect.low)
-    return bool(effect.low + margin < amplitude < effect.high - margin)
 
 
 def _noise(study: Study, seen: Look, final: Fit) -> dict[str, Any]:

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from greybed.residual.fit import Fit, extra, offsets
+from greybed.residual.fit import Fit, at_end, extra, offsets
 from greybed.residual.problem import Problem
 from greybed.residual.search import Search, log_odds
-from greybed.residual.terms import Term
+from greybed.residual.terms import FORM, Term
 
 Array = NDArray[np.float64]
 
 DECISIVE = float(np.log(20.0))  # log odds beyond which a rival is refuted
-EACH_MORE = float(np.log(10.0))  # log odds that one more term must win to be named
+EACH_MORE = float(np.log(3.0))  # log odds that one more term must win to be named
 MOVED = 0.3  # relative change of an amplitude that makes one more effect another explanation
 FORM_ERROR = 0.25  # an unnamed remainder below this share of a named effect is its form's error
 
@@ -81,7 +81,9 @@ def choose(problem: Problem, found: Search) -> Choice:
         A rival within a factor 20 of posterior odds makes it ambiguous, unless it only adds
         terms or is an unnamed law where a named one does as well.
     """
-    fits = tuple(f for f in found.fits if np.isfinite(f.log_evidence))
+    p = len(problem.names)
+    finite = [f for f in found.fits if np.isfinite(f.log_evidence)]
+    fits = tuple(f for f in finite if at_end(f, p) is None)
     if not fits:
         return Choice("unknown", found.null)
     chosen = _smallest(fits[0], fits)
@@ -93,7 +95,7 @@ def choose(problem: Problem, found: Search) -> Choice:
     top = max(log_odds(chosen), log_odds(fits[0]))
     rivals: list[Fit] = []
     for made in fits:
-        if top - log_odds(made) > DECISIVE or made is chosen:
+        if made is chosen or _gap(found, fits, chosen, made, top) > DECISIVE:
             continue
         if _inside(made) > _inside(chosen) and not _moves(problem, chosen, made):
             continue
@@ -114,6 +116,29 @@ def choose(problem: Problem, found: Search) -> Choice:
     if kinds & {"inside", "outside"}:
         return Choice("unknown", chosen)
     return Choice("effect", chosen, remainder=remainder)
+
+
+def _gap(found: Search, fits: tuple[Fit, ...], chosen: Fit, made: Fit, top: float) -> float:
+    """Log odds against a rival, the shapes of both trusted no further than laws hold.
+
+    Where two explanations fit nearly alike, the data could part them only by the exact shapes of
+    their laws. That part of the odds is limited to what a shape error of ``FORM`` leaves; the
+    part that comes from the amplitudes that theory allows stays.
+    """
+    gap = top - log_odds(made)
+    if gap <= DECISIVE or _kinds(made) | _kinds(chosen) != {"effect"}:
+        return gap
+    if len(made.terms) != len(chosen.terms):
+        return gap
+    common = _inside(made) & _inside(chosen)
+    without = next((f for f in (found.null, *fits) if _inside(f) == common), None)
+    if without is None:
+        return gap
+    own = float(np.sqrt(np.mean((chosen.fitted - without.fitted) ** 2)))
+    apart = float(np.sqrt(np.mean((chosen.fitted - made.fitted) ** 2)))
+    from_data = max(chosen.log_likelihood - made.log_likelihood, 0.0)
+    trusted = 0.5 * (apart / max(FORM * own, 1e-300)) ** 2
+    return gap - from_data + min(from_data, trusted)
 
 
 def _moves(problem: Problem, chosen: Fit, larger: Fit) -> bool:

@@ -76,6 +76,12 @@ class Effect:
         """Amplitude to begin a fit at: theory, or the middle of the range."""
         if self.theory is not None:
             return self.theory
-        small, large = sorted((abs(self.low), abs(self.high)))
+        small, large = self.sizes
         sign = 1.0 if self.low + self.high > 0.0 else -1.0
-        return sign * float(np.sqrt(max(small, 1e-3 * large) * large))
+        return sign * float(np.sqrt(small * large))
+
+    @property
+    def sizes(self) -> tuple[float, float]:
+        """Smallest and largest amplitude without sign; a range from 0 begins at a thousandth."""
+        small, large = sorted((abs(self.low), abs(self.high)))
+        return small if small > 0.0 else 1e-3 * large, large

@@ -34,6 +34,8 @@ class Fit:
         Transformed prediction.
     log_evidence : float
         Integrated over coefficients and noise, with the prior of each term.
+    log_likelihood : float
+        Of the residual at the best point, without priors.
     sigma, tau : float
         Random and group error at the best point.
     covariance : ndarray (p + k, p + k)
@@ -50,6 +52,7 @@ class Fit:
     u: Array
     fitted: Array
     log_evidence: float
+    log_likelihood: float
     sigma: float
     tau: float
     covariance: Array
@@ -113,6 +116,15 @@ def _slopes(problem: Problem, terms: tuple[Term, ...], u: Array, centre: Array) 
     return slopes
 
 
+def at_end(made: Fit, p: int) -> str | None:
+    """Name of an effect whose amplitude stands at the end of what physics allows."""
+    low, high = _bounds(made.terms, p, len(made.u))
+    for term, k in zip(made.terms, offsets(made.terms, p), strict=True):
+        if term.effect is not None and not low[k] * 1.001 < made.u[k] < high[k] * 0.999:
+            return term.name
+    return None
+
+
 @dataclass(frozen=True)
 class _Prior:
     """Local Gaussian shape of the prior at u: precision, pull and log density."""
@@ -135,7 +147,7 @@ def _prior(problem: Problem, terms: tuple[Term, ...], u: Array, flat: int | None
         if term.kind == "effect":
             assert term.effect is not None
             if term.effect.theory is not None:
-                sds = np.array([term.effect.spread, OFF_SPREAD])
+                sds = np.array([term.spread, OFF_SPREAD])
                 logs = np.log([1.0 - OFF_THEORY, OFF_THEORY])
                 logs = logs + stats.norm.logpdf(u[k], 1.0, sds)
                 total = float(np.logaddexp(*logs))
@@ -144,19 +156,20 @@ def _prior(problem: Problem, terms: tuple[Term, ...], u: Array, flat: int | None
                 pull[k] = (1.0 - u[k]) * precision[k]
                 density += total
             else:
-                low, high = sorted((abs(term.effect.low), abs(term.effect.high)))
-                low = max(low, 1e-3 * high)
+                low, high = term.effect.sizes
                 size = max(abs(float(u[k])), 1e-12)
                 # even in the logarithm of the amplitude, so it pulls nowhere
                 even -= float(np.log(size * np.log(high / low)))
-                precision[k] = 1e-9
+                # data that say nothing must leave the evidence as it was: a normal curve with the
+                # same peak as the even density has the same area
+                precision[k] = 2.0 * np.pi / (size * np.log(high / low)) ** 2
         else:
             sd = LABEL_SD if term.kind == "label" else POWER_SD
             precision[k] = sd**-2.0
             pull[k] = -u[k] * precision[k]
             density += float(stats.norm.logpdf(u[k], scale=sd))
             if term.size == 2:
-                precision[k + 1] = 1e-2
+                precision[k + 1] = 2.0 * np.pi / (2.0 * LARGEST_EXPONENT) ** 2
                 even -= float(np.log(2.0 * LARGEST_EXPONENT))
     if flat is not None:
         precision[flat] = 1e-12
@@ -169,10 +182,8 @@ def _bounds(terms: tuple[Term, ...], p: int, size: int) -> tuple[Array, Array]:
     high = np.full(size, np.inf)
     for term, k in zip(terms, offsets(terms, p), strict=True):
         if term.effect is not None:
-            ends = sorted(
-                (term.effect.low / term.effect.typical, term.effect.high / term.effect.typical)
-            )
-            low[k], high[k] = max(ends[0], 1e-3 * ends[1]), ends[1]
+            scale = abs(term.effect.typical)
+            low[k], high[k] = (size / scale for size in term.effect.sizes)
         elif term.size == 2:
             low[k + 1], high[k + 1] = -LARGEST_EXPONENT, LARGEST_EXPONENT
     return low, high
@@ -313,7 +324,9 @@ def _finish(
     size = len(u)
     if not np.isfinite(centre).all():
         nothing = np.full((size, 3), np.nan)
-        return Fit(terms, u, centre, -np.inf, np.nan, np.nan, np.eye(size), nothing, (0, 0), False)
+        return Fit(
+            terms, u, centre, -np.inf, -np.inf, 0.0, 0.0, np.eye(size), nothing, (0, 0), False
+        )
     slopes = _slopes(problem, terms, u, centre)
     gram = grams(grid, np.column_stack([problem.z - centre, slopes]))
     prior = _prior(problem, terms, u, flat)
@@ -328,6 +341,7 @@ def _finish(
     evidence += sum(term.log_prior for term in terms)
     point = np.unravel_index(int(np.argmax(score)), score.shape)
     chance = np.exp(score - score.max())
+    likelihood = -0.5 * (grid.log_det() + gram[..., 0, 0])[point]
     ends = np.full((size, 3), np.nan)
     if intervals:
         ends = _intervals(u, gram, prior, chance / chance.sum())
@@ -336,6 +350,7 @@ def _finish(
         u,
         centre,
         evidence,
+        float(likelihood),
         float(grid.sigma[point[1]]),
         float(grid.tau[point[0]]),
         np.linalg.inv(inner[point]) if size else np.zeros((0, 0)),

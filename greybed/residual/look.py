@@ -12,7 +12,7 @@ from greybed.residual.evidence import Scan, log_sum, null_statistics, scan
 from greybed.residual.noise import NoiseGrid, noise_grid
 from greybed.residual.problem import Problem
 from greybed.residual.screen import MOST_OUTLIERS, Screened, screen
-from greybed.residual.terms import Term, terms
+from greybed.residual.terms import Term, blurred, terms
 
 Array = NDArray[np.float64]
 
@@ -188,7 +188,7 @@ def _identifiable(
                 f"recalibrating the parameters absorbs all but {np.sqrt(after / before):.0%} of it"
             )
         else:
-            kept.append(term)
+            kept.append(blurred(term, min(1.0, np.sqrt(after / max(before, 1e-300)))))
     return kept, hidden
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ SHARE = {"effect": 0.60, "outside": 0.18, "label": 0.18, "inside": 0.04}
 EXPONENTS = (-2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0)
 POWER_SD = 0.5  # prior size of an unnamed dependence, of the transformed response
 LABEL_SD = 0.3  # prior size of an offset
+FORM = 0.10  # relative error of the shape of a published law, over the range of an experiment
 OFF_THEORY = 0.05  # prior share of amplitudes that theory does not foresee
 OFF_SPREAD = 0.8  # and their relative spread
 ATOMS_PER_DECADE = 2.0
@@ -52,6 +53,8 @@ class Term:
         Columns at the typical amplitude, in units of it.
     effect : Effect or None
         For kind ``effect``.
+    spread : float
+        Relative prior sd of the amplitude about theory, for these rows.
     basis : ndarray (n,) or None
         Covariate over its geometric mean, or the label's indicator.
     centre : float
@@ -65,6 +68,7 @@ class Term:
     log_prior: float
     atoms: tuple[Atom, ...]
     effect: Effect | None = None
+    spread: float = 0.0
     basis: Array | None = None
     centre: float = 1.0
     linear: bool = False
@@ -97,8 +101,7 @@ def _effect_atoms(problem: Problem, t: Array, effect: Effect) -> tuple[Atom, ...
             Atom(column, 1.0, effect.spread, float(np.log(1.0 - OFF_THEORY))),
             Atom(column, 1.0, OFF_SPREAD, float(np.log(OFF_THEORY))),
         )
-    small, large = sorted((abs(effect.low), abs(effect.high)))
-    small = max(small, 1e-3 * large)
+    small, large = effect.sizes
     count = max(2, int(np.ceil(ATOMS_PER_DECADE * np.log10(large / small))) + 1)
     sign = 1.0 if effect.low + effect.high > 0.0 else -1.0
     atoms = []
@@ -125,12 +128,14 @@ def _power_term(kind: str, name: str, values: Array, log_prior: float) -> Term:
         # powers need positive numbers
         centre = float(np.sqrt(np.mean(values**2)))
         line = Atom(values / centre, 0.0, POWER_SD, 0.0, 1.0)
-        return Term(kind, name, log_prior, (line,), None, values / centre, centre, True)
+        return Term(
+            kind, name, log_prior, (line,), basis=values / centre, centre=centre, linear=True
+        )
     centre = float(np.exp(np.mean(np.log(values))))
     basis = values / centre
     share = -float(np.log(len(EXPONENTS)))
     atoms = tuple(Atom(power(basis, n), 0.0, POWER_SD, share, n) for n in EXPONENTS)
-    return Term(kind, name, log_prior, atoms, None, basis, centre)
+    return Term(kind, name, log_prior, atoms, basis=basis, centre=centre)
 
 
 def _label_values(problem: Problem) -> list[tuple[str, str, Array]]:
@@ -182,7 +187,7 @@ def terms(problem: Problem, t: Array) -> tuple[list[Term], dict[str, str]]:
             made[effect.name] = (effect, atoms)
     for name, (effect, atoms) in made.items():
         prior = float(np.log(SHARE["effect"] / len(made)))
-        found.append(Term("effect", name, prior, atoms, effect=effect))
+        found.append(Term("effect", name, prior, atoms, effect=effect, spread=effect.spread))
     covariates = problem.covariates()
     known = {*problem.used, *(c for e in effects.values() for c in e.columns)}
     for kind in ("outside", "inside"):
@@ -196,3 +201,16 @@ def terms(problem: Problem, t: Array) -> tuple[list[Term], dict[str, str]]:
         atom = Atom(indicator, 0.0, LABEL_SD, 0.0)
         found.append(Term("label", f"{name}={value}", prior, (atom,), basis=indicator))
     return found, failed
+
+
+def blurred(term: Term, visible: float) -> Term:
+    """The term with its theory trusted as far as these rows can show it.
+
+    Where recalibration absorbs all but a share ``visible`` of an effect, its amplitude hangs on
+    the remaining curvature, and the error of the law's shape weighs as much more.
+    """
+    if term.effect is None or term.effect.theory is None:
+        return term
+    spread = float(np.hypot(term.effect.spread, FORM * np.sqrt(1.0 / visible**2 - 1.0)))
+    near, *others = term.atoms
+    return replace(term, spread=spread, atoms=(replace(near, sd=spread), *others))

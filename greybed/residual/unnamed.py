@@ -15,6 +15,20 @@ Array = NDArray[np.float64]
 
 EXPONENTS = np.arange(-4.0, 4.0 + 1e-9, 0.05)
 SIZES = np.geomspace(0.003, 100.0, 60)  # largest relative change to try
+MOST_TAKEN = 0.95
+BARE = 3.0  # log likelihood by which an unusual form must beat a usual one
+# Form, and whether it is usual: something added to the response or to a resistance. A share taken
+# away turns negative somewhere, and a bare power tends to no limit.
+FORMS = {
+    False: (
+        ("times", True),
+        ("over", True),
+        ("times less", False),
+        ("over less", False),
+        ("power", False),
+    ),
+    True: (("added", True),),
+}
 DROP = 1.92  # of the log likelihood at the ends of a 95 % interval
 
 
@@ -53,8 +67,10 @@ def dependence(problem: Problem, grid: NoiseGrid, made: Fit, term: Term) -> Depe
     white = _whitener(problem, grid, made, k, term.size)
     best: tuple[float, float, tuple[float, float]] | None = None
     linear = problem.model.transform != "log"
-    for form in ("added",) if linear else ("times", "over", "power"):
+    for form, natural in FORMS[linear]:
         profile = _profile(white, residual, np.log(term.basis), form)
+        if not natural:
+            profile = profile - BARE
         top = int(np.argmax(profile))
         if best is None or profile[top] > best[0]:
             near = EXPONENTS[profile > profile[top] - DROP]
@@ -101,15 +117,16 @@ def _profile(white: Array, residual: Array, log_z: Array, form: str) -> Array:
             off = y - x * (float(x @ y) / float(x @ x))
             profile[i] = -0.5 * float(off @ off)
             continue
-        sizes = np.concatenate([SIZES, -SIZES[SIZES < 0.95]])
+        less = form.endswith("less")
+        sizes = -SIZES[SIZES < MOST_TAKEN] if less else SIZES
         for _ in range(3):
             curves = np.log1p(np.outer(z, sizes))
-            off = y[:, None] - white @ (curves if form == "times" else -curves)
+            off = y[:, None] - white @ (curves if form.startswith("times") else -curves)
             cost = 0.5 * np.einsum("ij,ij->j", off, off)
             b = int(np.argmin(cost))
             profile[i] = max(profile[i], -float(cost[b]))
             sizes = sizes[b] * np.linspace(0.8, 1.25, 15)
-            sizes = sizes[sizes > -0.999]
+            sizes = sizes[sizes > -0.999]  # nothing may turn negative
     return profile
 
 
