@@ -90,6 +90,10 @@ def make(stratum: dict[str, Any], seed: int, index: int) -> BlindSet:
     setting_sd, truth = _missettings(
         world, columns, true_value, active, groups, group_share * noise, rng
     )
+    moved = {**columns, world.setting: columns[world.setting] * 1.001}
+    steep = (np.log(_respond(world, moved, true_value, active)) - np.log(truth)) / 0.001
+    covariance = np.diag(_spreads(stratum, random, columns, world) ** 2)
+    covariance += setting_sd**2 * np.outer(steep, steep) * (groups[:, None] == groups[None, :])
     response, label, faulty, clean = _measure(stratum, truth, random, columns, world, rng)
     answer = {
         **stratum,
@@ -105,6 +109,9 @@ def make(stratum: dict[str, Any], seed: int, index: int) -> BlindSet:
         "ratio": float(np.sqrt(np.mean(visible**2))) / noise,
         "alike": _alike(world, columns, true_value, active, stratum["free"], slope),
         "noise": noise,
+        "weakest": _weakest(
+            world, columns, true_value, active, slope if stratum["free"] else None, covariance
+        ),
         "oracle": float(
             np.sqrt(
                 np.mean(
@@ -254,10 +261,7 @@ def _measure(
     rng: np.random.Generator,
 ) -> tuple[Array, dict[str, Any] | None, Array, NDArray[np.bool_]]:
     n = len(truth)
-    sd = np.full(n, random)
-    if stratum["uneven"]:  # a factor 3 from end to end of the main condition
-        rank = np.argsort(np.argsort(columns[world.main])) / max(n - 1, 1)
-        sd = random * 3.0 ** (rank - 0.5)
+    sd = _spreads(stratum, random, columns, world)
     error = sd * rng.standard_normal(n)
     clean = np.ones(n, dtype=bool)
     if stratum["outliers"]:
@@ -280,6 +284,49 @@ def _measure(
         label = {"label": kind, "value": bad, "words": words}
     response = np.exp(np.log(truth) + error + shift)
     return response, label, shift, clean
+
+
+def _spreads(
+    stratum: dict[str, Any], random: float, columns: dict[str, Array], world: World
+) -> Array:
+    """Random error of each row: a factor 3 from end to end of the main condition, or even."""
+    n = len(columns[world.main])
+    if not stratum["uneven"]:
+        return np.full(n, random)
+    rank = np.argsort(np.argsort(columns[world.main])) / max(n - 1, 1)
+    return np.asarray(random * 3.0 ** (rank - 0.5))
+
+
+def _weakest(
+    world: World,
+    columns: dict[str, Array],
+    value: float,
+    active: Active,
+    slope: Array | None,
+    covariance: Array,
+) -> float:
+    """Standard errors by which the weakest true effect shows, all else about it known.
+
+    What the other true effects and a free parameter could stand in for is taken out; no test
+    can find an effect of less than some five of these without false alarms.
+    """
+    inverse = np.linalg.inv(covariance)
+    full = np.log(_respond(world, columns, value, active))
+    weakest = np.inf
+    names = [name for name in active if name != "outside"]
+    shares = {
+        name: full
+        - np.log(_respond(world, columns, value, {k: v for k, v in active.items() if k != name}))
+        for name in names
+    }
+    for name in names:
+        own = shares[name]
+        others = [shares[k] for k in names if k != name] + ([] if slope is None else [slope])
+        if others:
+            x = np.column_stack(others)
+            own = own - x @ np.linalg.solve(x.T @ inverse @ x, x.T @ inverse @ own)
+        weakest = min(weakest, float(np.sqrt(max(own @ inverse @ own, 0.0))))
+    return weakest if np.isfinite(weakest) else 0.0
 
 
 def _alike(

@@ -5,12 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy import stats
+from numpy.typing import NDArray
 
+from greybed.residual.evidence import log_sum
 from greybed.residual.fit import Fit, grams
 from greybed.residual.look import Look
+from greybed.residual.terms import Term
+
+Array = NDArray[np.float64]
 
 POWER = 0.9  # chance of being seen
+DRAWS = 400
 
 
 def detectable(seen: Look, null: Fit, critical: float) -> dict[str, Any]:
@@ -36,21 +41,46 @@ def detectable(seen: Look, null: Fit, critical: float) -> dict[str, Any]:
     for term in seen.terms:
         if term.effect is None:
             continue
-        atom = term.atoms[0]
-        gram = grams(seen.grid, np.column_stack([atom.column, seen.nuisance]))[tau, sigma]
-        inner = gram[1:, 1:] + np.diag(seen.precision)
-        norm = float(gram[0, 0] - gram[0, 1:] @ np.linalg.solve(inner, gram[1:, 0]))
-        if norm <= 0.0:
+        columns = np.column_stack([a.column for a in term.atoms])
+        gram = grams(seen.grid, np.column_stack([columns, seen.nuisance]))[tau, sigma]
+        m = columns.shape[1]
+        inner = gram[m:, m:] + np.diag(seen.precision)
+        norm = gram[:m, :m] - gram[:m, m:] @ np.linalg.solve(inner, gram[m:, :m])
+        size = _smallest(term, norm, critical)
+        if size is None:
             continue
-        sd = 1.0 / np.sqrt(norm)
-        # a term alone must carry the whole statistic, its prior share included
-        needed = critical - term.log_prior + 0.5 * np.log1p(norm / max(atom.sd**-2.0, 1e-12))
-        size = sd * (np.sqrt(2.0 * max(needed, 0.0)) + float(stats.norm.isf(1.0 - POWER)))
-        relative = size * float(np.sqrt(np.mean(atom.column**2)))
+        middle = columns[:, m // 2]
         found[term.name] = {
             "amplitude": size * abs(term.effect.typical),
-            "relative": relative,
+            "relative": size * float(np.sqrt(np.mean(middle**2))),
             "theory": term.effect.theory,
         }
     smallest = min((item["relative"] for item in found.values()), default=float("nan"))
     return {"relative": smallest, "effects": found}
+
+
+def _smallest(term: Term, norm: Array, critical: float) -> float | None:
+    """Amplitude over typical at which the term alone lifts the statistic over the critical one.
+
+    ``norm`` holds the atoms against each other, nuisance projected out; the projections of a
+    residual with amplitude a are normal with mean a times a column of it and covariance ``norm``.
+    """
+    values, vectors = np.linalg.eigh(norm)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    noise = np.random.default_rng(0).standard_normal((DRAWS, len(norm))) @ root.T
+    mean = np.array([a.mean for a in term.atoms])
+    precision = np.array([a.sd for a in term.atoms]) ** -2.0
+    weight = np.array([a.log_weight for a in term.atoms]) + term.log_prior
+    q = np.diag(norm)
+
+    def seen(size: float) -> float:
+        c = size * norm[:, len(norm) // 2] + noise
+        factor = 0.5 * (c - q * mean) ** 2 / (q + precision) + mean * c
+        factor = factor - 0.5 * mean**2 * q - 0.5 * np.log1p(q / precision) + weight
+        return float(np.mean(log_sum(factor, axis=1) > critical))
+
+    sizes = np.geomspace(1e-3, 1e3, 121)
+    for size in sizes:
+        if seen(float(size)) >= POWER:
+            return float(size)
+    return None

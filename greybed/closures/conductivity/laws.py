@@ -53,7 +53,9 @@ def zehner_schluender(
     shape = 1.25 * ((1.0 - eps) / eps) ** (10.0 / 9.0)
     root = np.sqrt(1.0 - eps)
     close = np.abs(1.0 - shape / kappa) < NEAR
-    # the singularity is removable: the mean of both sides is right to second order
+    # the singularity is removable: between points on both sides the course is straight enough
     low = _core(np.where(close, shape / (1.0 + 2.0 * NEAR), kappa), shape)
     high = _core(np.where(close, shape / (1.0 - 2.0 * NEAR), kappa), shape)
-    return kg * (1.0 - root + root * 0.5 * (low + high))
+    share = np.where(close, (1.0 - shape / kappa + 2.0 * NEAR) / (4.0 * NEAR), 0.5)
+    core = low + share * (high - low)
+    return kg * (1.0 - root + root * core)
