@@ -16,6 +16,7 @@ Row = Mapping[str, Any]  # {"truth": ..., "found": ..., "competitors": ...}
 QUIET = ("none", "not-identifiable")
 EXPONENT = 0.2
 TENTH = 0.1
+PLAIN = 5.0  # standard errors
 
 
 @dataclass(frozen=True)
@@ -161,9 +162,26 @@ def score(rows: Sequence[Row], alpha: float) -> list[Line]:
         0.95,
         True,
     )
+    strong = [r for r in real if r["truth"]["weakest"] >= PLAIN]
+    add(
+        f"  of these, every effect {PLAIN:g} standard errors strong",
+        strong,
+        lambda r: bool(_named(r["found"])) and _named(r["found"])[0] in _true(r["truth"]),
+        0.95,
+        True,
+    )
     add(
         "exact set",
         real,
+        lambda r: (
+            set(_named(r["found"])) == _true(r["truth"]) and r["found"]["verdict"] == "effect"
+        ),
+        0.90,
+        True,
+    )
+    add(
+        f"  of these, every effect {PLAIN:g} standard errors strong ",
+        strong,
         lambda r: (
             set(_named(r["found"])) == _true(r["truth"]) and r["found"]["verdict"] == "effect"
         ),
@@ -181,10 +199,10 @@ def score(rows: Sequence[Row], alpha: float) -> list[Line]:
         0.90,
         True,
     )
-    strong = [r for r in kind("outside") if r["truth"]["ratio"] >= 1.9 and r["truth"]["n"] >= 40]
+    loud = [r for r in kind("outside") if r["truth"]["ratio"] >= 1.9 and r["truth"]["n"] >= 40]
     add(
         "outside the catalogue: unknown, right covariate",
-        strong,
+        loud,
         lambda r: (
             r["found"]["verdict"] == "unknown"
             and bool(r["found"]["depends_on"])
@@ -195,7 +213,7 @@ def score(rows: Sequence[Row], alpha: float) -> list[Line]:
     )
     right = [
         r
-        for r in strong
+        for r in loud
         if r["found"]["depends_on"]
         and r["found"]["depends_on"][0]["covariate"] == r["truth"]["outside"]["covariate"]
     ]

@@ -19,7 +19,7 @@ KINDS = ("none", "one", "two", "outside", "hidden", "faulty")
 ALPHA = 0.01
 TRUTH = (
     *("kind", "world", "n", "rho", "ratio", "collinear"),
-    *("free", "grouped", "declared", "uneven", "outliers", "alike"),
+    *("free", "grouped", "declared", "uneven", "outliers", "alike", "weakest"),
 )
 
 

@@ -25,7 +25,7 @@ class BedConductivity(ClosedForm):
         "solid_conductivity",
         "gas_conductivity",
     )
-    options = (*LAW_KEYS, "reference_temperature")
+    options = (*LAW_KEYS, "reference_temperature", "exchange")
     default_law = "zehner-schluender"
 
     def _prepare(self, table: Table, parameters: Mapping[str, float]) -> None:
@@ -35,16 +35,23 @@ class BedConductivity(ClosedForm):
                 f"model.base = {self.law!r} is not a known law; take zehner-schluender."
             )
 
+        exchange = self.spec.options.get("exchange", "grey")
+        if exchange not in ("grey", "black"):
+            raise InputError(f"model.exchange = {exchange!r} must be 'grey' or 'black'.")
+        self._black = exchange == "black"
+
     def excluded(self, effect: Effect) -> str | None:
-        """Emissivity acts on radiation that the base already has."""
+        """Emissivity is an effect of its own only where the base radiates as if black."""
+        if effect.name == "emissivity" and not self._black:
+            return "radiation takes the emissivity up itself, unless exchange = 'black'"
         if effect.name == "emissivity" and "radiation" not in self.spec.effects:
-            return "the base has no radiation for it to act on; radiation itself takes it up"
+            return "the base has no radiation for it to act on"
         return None
 
     def complete(self, c: dict[str, Array]) -> dict[str, Array]:
-        """Radiative exchange: 1 for black spheres; radiation that is added takes emissivities."""
+        """Radiative exchange: by the emissivity where one is given, 1 for black spheres."""
         size = len(c["temperature"])
-        if "emissivity" in c and "radiation" not in self.spec.effects:
+        if "emissivity" in c and not self._black:
             c["exchange"] = 1.0 / (2.0 / c["emissivity"] - 1.0)
         else:
             c["exchange"] = np.ones(size)
