@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from greybed.closures import ViewFactorClosure
+    from greybed.closures.term import GreyBoxTerm
 
 TARGETS = ("cpp", "onnx")
 
@@ -33,7 +34,7 @@ def targets(text: str) -> tuple[str, ...]:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``greybed export``."""
-    parser.add_argument("model", metavar="MODEL", help="a .closure file")
+    parser.add_argument("model", metavar="MODEL", help="a .closure file or a grey-box term")
     parser.add_argument(
         "--to", type=targets, required=True, metavar="LIST", help="cpp, onnx, or cpp,onnx"
     )
@@ -73,22 +74,46 @@ def _replayed(
         return {**replay(closure, program, CPP_TOLERANCE), "compiler": " ".join(compiler)}
 
 
+def _replayed_term(
+    term: GreyBoxTerm, target: str, folder: Path, name: str | None
+) -> dict[str, Any]:
+    """The same for a grey-box term."""
+    import tempfile
+
+    from greybed.export import term as exports
+
+    word = name or term.name
+    if target == "onnx":
+        path = exports.export_term_onnx(term, folder / f"{word}.onnx", name)
+        return exports.replay_term_onnx(term, path)
+    header = exports.export_term_cpp(term, folder, name)
+    with tempfile.TemporaryDirectory() as build:
+        return exports.replay_term_cpp(header, Path(build))
+
+
 def run(options: argparse.Namespace) -> int:
     """Export, replay, move the files to their place."""
     import os
     import tempfile
 
     from greybed.closures import content_hash, load
+    from greybed.closures.term import is_term, load_term
     from greybed.core.files import atomic_path, output_folder, write_summary
 
-    closure = load(options.model)
+    term = load_term(options.model) if is_term(options.model) else None
+    closure = None if term is not None else load(options.model)
     folder = output_folder(options.out)
     results: dict[str, Any] = {}
     # Files reach their place only after the replay: a header that computes wrongly is never seen.
     with tempfile.TemporaryDirectory(dir=folder, prefix=".export-") as name:
         workplace = Path(name)
         for target in options.to:
-            result = results[target] = _replayed(closure, target, workplace, options.name)
+            if closure is not None:
+                result = _replayed(closure, target, workplace, options.name)
+            else:
+                assert term is not None
+                result = _replayed_term(term, target, workplace, options.name)
+            results[target] = result
             if result["passed"] is None:
                 print(f"{target}: golden rows not replayed ({result['reason']})")
                 continue
@@ -100,7 +125,7 @@ def run(options: argparse.Namespace) -> int:
             if not result["passed"]:
                 print(
                     f"{target}: refused, nothing written: {result['failing_rows']} rows and "
-                    f"{result['self_test']} of the header's own checks fail; try another "
+                    f"{result.get('self_test', 0)} of the header's own checks fail; try another "
                     "compiler in CXX, or train the closure again."
                 )
                 return 1
@@ -108,10 +133,11 @@ def run(options: argparse.Namespace) -> int:
         for file in files:
             with atomic_path(folder / file) as temporary:
                 os.replace(workplace / file, temporary)
+    sealed = term.content_hash() if term is not None else content_hash(load(options.model))
     summary = write_summary(
         folder,
         "export",
-        {"hash": content_hash(closure), "files": files, "targets": results},
+        {"hash": sealed, "files": files, "targets": results},
         options.model,
     )
     for file in files:

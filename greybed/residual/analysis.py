@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from greybed.closures.term import GreyBoxTerm
 from greybed.core.errors import InputError
 from greybed.core.progress import progress
 from greybed.residual.choice import Choice, choose
@@ -116,13 +117,15 @@ def _answer(
     verdict = _verdict(seen, choice)
     p = len(problem.names)
     depends: tuple[Dependence, ...] = ()
+    closures: tuple[GreyBoxTerm, ...] = ()
     suspect = None
-    if verdict == "unknown" or choice is not None:
-        depends = tuple(
-            dependence(problem, seen.grid, final, term)
-            for term in final.terms
-            if term.kind in ("inside", "outside")
-        )
+    if choice is not None:
+        for term in final.terms:
+            if term.kind in ("inside", "outside"):
+                one, closure = dependence(problem, seen.grid, final, term)
+                depends = (*depends, one)
+                if closure is not None and problem.model.transform == "log":
+                    closures = (*closures, closure)
     for term in final.terms:
         if term.kind == "label":
             label, value = term.name.split("=", 1)
@@ -139,6 +142,7 @@ def _answer(
         "rivals": rivals,
         "experiment": trial,
         "depends_on": depends,
+        "closures": closures if verdict == "unknown" else (),
         "suspect": suspect,
         "error": errors(problem, held, options.seed),
         "parameters": _shifts(problem, final),

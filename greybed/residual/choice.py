@@ -91,6 +91,12 @@ def choose(problem: Problem, found: Search) -> Choice:
         named = [f for f in fits if _kinds(f) <= {"effect"}]
         if named and log_odds(fits[0]) - log_odds(named[0]) < DECISIVE:
             chosen = _smallest(named[0], fits)
+    if _kinds(chosen) == {"inside"}:
+        # a named effect whose shape is a little off may look like a law of its own
+        mended = [f for f in fits if _kinds(f) == {"effect", "inside"}]
+        if mended and log_odds(fits[0]) - log_odds(mended[0]) < DECISIVE:
+            _, small = _without_form_error(problem, mended[0], fits)
+            chosen = mended[0] if small is not None else chosen
     chosen, remainder = _without_form_error(problem, chosen, fits)
     top = max(log_odds(chosen), log_odds(fits[0]))
     rivals: list[Fit] = []
@@ -108,6 +114,8 @@ def choose(problem: Problem, found: Search) -> Choice:
         rivals = [r for r in rivals if not _inside(made) < _inside(r)]
         rivals.append(made)
     rivals = [r for r in rivals if not _inside(r) < _inside(chosen)]
+    if (problem.prior_sd > 1.0).any():
+        rivals += _without_trifles(found, fits, chosen)
     if rivals:
         return Choice("ambiguous", chosen, (chosen, *rivals), remainder)
     kinds = _kinds(chosen)
@@ -139,6 +147,25 @@ def _gap(found: Search, fits: tuple[Fit, ...], chosen: Fit, made: Fit, top: floa
     from_data = max(chosen.log_likelihood - made.log_likelihood, 0.0)
     trusted = 0.5 * (apart / max(FORM * own, 1e-300)) ** 2
     return gap - from_data + min(from_data, trusted)
+
+
+def _without_trifles(found: Search, fits: tuple[Fit, ...], chosen: Fit) -> list[Fit]:
+    """Smaller sets that a shape error of ``FORM`` would leave as likely.
+
+    With a free parameter in the fit, most of an effect can be absorbed, and what is left of it
+    is no larger than the error of another one's shape.
+    """
+    smaller = []
+    for made in fits:
+        if not made.terms or not _inside(made) < _inside(chosen) or _kinds(chosen) != {"effect"}:
+            continue
+        whole = float(np.sqrt(np.mean((chosen.fitted - found.null.fitted) ** 2)))
+        apart = float(np.sqrt(np.mean((chosen.fitted - made.fitted) ** 2)))
+        from_data = max(chosen.log_likelihood - made.log_likelihood, 0.0)
+        trusted = 0.5 * (apart / max(FORM * whole, 1e-300)) ** 2
+        if log_odds(chosen) - log_odds(made) - from_data + min(from_data, trusted) < EACH_MORE:
+            smaller.append(made)
+    return smaller
 
 
 def _moves(problem: Problem, chosen: Fit, larger: Fit) -> bool:

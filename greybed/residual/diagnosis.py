@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from greybed.closures.term import GreyBoxTerm
+
 Array = NDArray[np.float64]
 VERDICTS = ("none", "effect", "ambiguous", "unknown", "suspect-data", "not-identifiable")
 
@@ -105,6 +107,7 @@ class Diagnosis:
     rivals: tuple[tuple[str, ...], ...] = ()
     experiment: Mapping[str, Any] | None = None
     depends_on: tuple[Dependence, ...] = ()
+    closures: tuple[GreyBoxTerm, ...] = ()  # of the dependences, to run and to export
     suspect: Mapping[str, str] | None = None  # {"label": ..., "value": ...}
     error: Errors
     parameters: Mapping[str, Shift] = field(default_factory=dict)
@@ -128,7 +131,7 @@ class Diagnosis:
         return {
             name: _plain(getattr(self, name))
             for name in self.__dataclass_fields__
-            if name not in ("rows", "model", "case")
+            if name not in ("rows", "model", "case", "closures")
         }
 
 

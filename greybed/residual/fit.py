@@ -177,6 +177,11 @@ def _prior(problem: Problem, terms: tuple[Term, ...], u: Array, flat: int | None
     return _Prior(precision, pull, density + even, density)
 
 
+def prior_precision(problem: Problem, made: Fit) -> Array:
+    """Prior precision of each entry of u, shape (p + k,)."""
+    return _prior(problem, made.terms, made.u).precision
+
+
 def _bounds(terms: tuple[Term, ...], p: int, size: int) -> tuple[Array, Array]:
     low = np.full(size, -np.inf)
     high = np.full(size, np.inf)

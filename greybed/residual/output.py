@@ -31,7 +31,8 @@ def write_diagnosis(folder: Path, study: Study, diagnosis: Diagnosis) -> dict[st
     Returns
     -------
     files : dict of str to Path
-        ``diagnosis``, ``residuals`` and ``model``; ``case`` where the model is one.
+        ``diagnosis``, ``residuals`` and ``model``; ``case`` where the model is one; grey-box
+        terms by name.
     """
     files = {
         "diagnosis": write_json(folder / "diagnosis.json", diagnosis.to_json()),
@@ -42,6 +43,8 @@ def write_diagnosis(folder: Path, study: Study, diagnosis: Diagnosis) -> dict[st
     with atomic_path(files["model"]) as temporary, open(temporary, "wb") as stream:
         stream.write(f"# {diagnosis.sentence}\n".encode())
         tomli_w.dump(next_study(folder, study, diagnosis), stream)
+    for closure in diagnosis.closures:
+        files[closure.name] = closure.save(folder / f"{closure.name}.json")
     if diagnosis.case is not None:
         files["case"] = folder / "case_with_effect.toml"
         with atomic_path(files["case"]) as temporary, open(temporary, "wb") as stream:
@@ -137,6 +140,9 @@ def next_study(folder: Path, study: Study, diagnosis: Diagnosis) -> dict[str, An
     if noise:
         content["noise"] = noise
     content["model"] = _paths(dict(diagnosis.model), study, folder)
+    if diagnosis.closures:
+        old = content["model"].get("terms", [])
+        content["model"]["terms"] = [*old, *(f"{c.name}.json" for c in diagnosis.closures)]
     if parameters:
         content["parameters"] = parameters
     content["options"] = options
@@ -148,6 +154,8 @@ def _paths(model: dict[str, Any], study: Study, folder: Path) -> dict[str, Any]:
     base = Path(study.model.folder).resolve()
     if isinstance(model.get("file"), str):
         model["file"] = os.path.relpath(base / model["file"], folder.resolve())
+    if "terms" in model:
+        model["terms"] = [os.path.relpath(base / t, folder.resolve()) for t in model["terms"]]
     if isinstance(model.get("function"), str):
         model["folder"] = os.path.relpath(base / str(model.get("folder", ".")), folder.resolve())
     return _without_none(model)

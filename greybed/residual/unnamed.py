@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from greybed.closures.term import GreyBoxTerm
 from greybed.residual.diagnosis import Dependence
-from greybed.residual.fit import Fit, extra, offsets, predict
+from greybed.residual.fit import Fit, extra, offsets, predict, prior_precision
 from greybed.residual.noise import NoiseGrid
 from greybed.residual.problem import Problem
 from greybed.residual.terms import POWER_SD, Term
@@ -16,6 +17,7 @@ Array = NDArray[np.float64]
 EXPONENTS = np.arange(-4.0, 4.0 + 1e-9, 0.05)
 SIZES = np.geomspace(0.003, 100.0, 60)  # largest relative change to try
 MOST_TAKEN = 0.95
+LEAST_PRECISION = 0.05  # of what else is fitted, so that no digits are lost
 BARE = 3.0  # log likelihood by which an unusual form must beat a usual one
 # Form, and whether it is usual: something added to the response or to a resistance. A share taken
 # away turns negative somewhere, and a bare power tends to no limit.
@@ -32,7 +34,9 @@ FORMS = {
 DROP = 1.92  # of the log likelihood at the ends of a 95 % interval
 
 
-def dependence(problem: Problem, grid: NoiseGrid, made: Fit, term: Term) -> Dependence:
+def dependence(
+    problem: Problem, grid: NoiseGrid, made: Fit, term: Term
+) -> tuple[Dependence, GreyBoxTerm | None]:
     """Exponent of an unnamed term that ``made`` holds.
 
     Parameters
@@ -47,8 +51,10 @@ def dependence(problem: Problem, grid: NoiseGrid, made: Fit, term: Term) -> Depe
     Returns
     -------
     dependence : Dependence
-        Of the best of three forms: response times 1 + a z^n, response over 1 + a z^n (an added
-        resistance), and a bare power z^n.
+        Of the best form: response times 1 + a z^n, response over 1 + a z^n (an added
+        resistance), or unusual ones where they fit clearly better.
+    closure : GreyBoxTerm or None
+        The better of the two usual forms, to run and to export; None where there is no power.
     """
     p = len(problem.names)
     k = offsets(made.terms, p)[made.terms.index(term)]
@@ -60,23 +66,43 @@ def dependence(problem: Problem, grid: NoiseGrid, made: Fit, term: Term) -> Depe
     ends = (float(window.min()), float(window.max()))
     assert term.basis is not None
     if term.linear:
-        return Dependence(
-            covariate=term.name, exponent=1.0, ci95=(float("nan"), float("nan")), window=ends
-        )
+        unsure = (float("nan"), float("nan"))
+        return Dependence(covariate=term.name, exponent=1.0, ci95=unsure, window=ends), None
     residual = problem.z - (made.fitted - alone)
     white = _whitener(problem, grid, made, k, term.size)
     best: tuple[float, float, tuple[float, float]] | None = None
+    usual: tuple[float, GreyBoxTerm] | None = None
     linear = problem.model.transform != "log"
     for form, natural in FORMS[linear]:
-        profile = _profile(white, residual, np.log(term.basis), form)
+        profile, sizes = _profile(white, residual, np.log(term.basis), form)
         if not natural:
             profile = profile - BARE
         top = int(np.argmax(profile))
+        n = float(EXPONENTS[top])
+        if form in ("times", "over") and n != 0.0 and (usual is None or profile[top] > usual[0]):
+            # sizes are those at the largest value of basis^n
+            extreme = values.max() if n > 0.0 else values.min()
+            usual = (
+                float(profile[top]),
+                GreyBoxTerm(
+                    name=f"{term.name}_term",
+                    covariate=term.name,
+                    unit=problem.study.table.units.get(term.name, ""),
+                    response=problem.study.response,
+                    reference=float(extreme),
+                    amplitude=float(sizes[top]),
+                    exponent=n,
+                    side=1 if form == "times" else -1,
+                    window=(float(values.min()), float(values.max())),
+                    card={"model": problem.model.name, "rows": len(problem)},
+                ),
+            )
         if best is None or profile[top] > best[0]:
             near = EXPONENTS[profile > profile[top] - DROP]
             best = (float(profile[top]), _peak(profile, top), (float(near[0]), float(near[-1])))
     assert best is not None
-    return Dependence(covariate=term.name, exponent=best[1], ci95=best[2], window=ends)
+    found = Dependence(covariate=term.name, exponent=best[1], ci95=best[2], window=ends)
+    return found, None if usual is None else usual[1]
 
 
 def _whitener(problem: Problem, grid: NoiseGrid, made: Fit, k: int, size: int) -> Array:
@@ -92,15 +118,16 @@ def _whitener(problem: Problem, grid: NoiseGrid, made: Fit, k: int, size: int) -
         slopes.append((predict(problem, made.terms, moved) - centre) / step)
     if slopes:
         matrix = np.column_stack(slopes)
-        prior = np.linalg.inv(np.linalg.inv(made.covariance)[np.ix_(others, others)])
-        # what the data say of the others is said again by the likelihood; take a wide prior
-        covariance = covariance + 25.0 * matrix @ prior @ matrix.T
+        # the others may move as far as they might before the data
+        precision = np.maximum(prior_precision(problem, made)[others], LEAST_PRECISION)
+        covariance = covariance + (matrix / precision) @ matrix.T
     return np.linalg.inv(np.linalg.cholesky(covariance))
 
 
-def _profile(white: Array, residual: Array, log_z: Array, form: str) -> Array:
-    """Log likelihood of each exponent, amplitude (and constant) at their best."""
+def _profile(white: Array, residual: Array, log_z: Array, form: str) -> tuple[Array, Array]:
+    """Log likelihood of each exponent, amplitude (and constant) at their best; amplitudes."""
     profile = np.full(len(EXPONENTS), -np.inf)
+    chosen = np.zeros(len(EXPONENTS))
     y = white @ residual
     one = white @ np.ones(len(residual))
     for i, n in enumerate(EXPONENTS):
@@ -124,10 +151,11 @@ def _profile(white: Array, residual: Array, log_z: Array, form: str) -> Array:
             off = y[:, None] - white @ (curves if form.startswith("times") else -curves)
             cost = 0.5 * np.einsum("ij,ij->j", off, off)
             b = int(np.argmin(cost))
-            profile[i] = max(profile[i], -float(cost[b]))
+            if -float(cost[b]) > profile[i]:
+                profile[i], chosen[i] = -float(cost[b]), sizes[b]
             sizes = sizes[b] * np.linspace(0.8, 1.25, 15)
             sizes = sizes[sizes > -0.999]  # nothing may turn negative
-    return profile
+    return profile, chosen
 
 
 def _peak(profile: Array, top: int) -> float:

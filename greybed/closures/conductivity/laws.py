@@ -8,17 +8,30 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 STEFAN_BOLTZMANN = 5.670374419e-8  # W/m2/K4, CODATA 2018
-NEAR = 1e-3  # distance of B/kappa from 1 at which the formula loses its digits
+NEAR = 0.1  # below this 1 - B / kappa the closed form loses digits and the series has them
+NOTHING = 1e-200
+TERMS = 16  # of the series; the first one left out is below 1e-16
 
 
 def _core(kappa: Array, shape: Array) -> Array:
     """Conductivity of the core of the cell over that of the gas."""
     n = 1.0 - shape / kappa
-    return (2.0 / n) * (
-        shape * (1.0 - 1.0 / kappa) / n**2 * np.log(kappa / shape)
+    close = np.abs(n) < NEAR
+    far = np.where(close, 1.0, n)
+    # no spheres, shape = 0: the logarithm's factor is 0 there
+    ratio = kappa / np.maximum(shape, NOTHING)
+    closed = (2.0 / far) * (
+        shape * (1.0 - 1.0 / kappa) / far**2 * np.log(ratio)
         - 0.5 * (shape + 1.0)
-        - (shape - 1.0) / n
+        - (shape - 1.0) / far
     )
+    if not close.any():
+        return closed
+    near = np.where(close, n, 0.0)
+    series = np.zeros_like(n)
+    for k in reversed(range(TERMS)):
+        series = series * near + 2.0 * ((shape - 1.0) / (k + 3.0) + 1.0 / (k + 2.0))
+    return np.where(close, series, closed)
 
 
 def zehner_schluender(
@@ -31,7 +44,7 @@ def zehner_schluender(
     solid_conductivity, gas_conductivity : array_like, broadcast together
         Of the spheres and of the gas between them [W/m/K], above 0.
     void_fraction : array_like
-        Of the bed, 0 to 1 exclusive [-].
+        Of the bed, above 0 and up to 1 [-]; tested by its authors between 0.2 and 0.6.
 
     Returns
     -------
@@ -41,7 +54,9 @@ def zehner_schluender(
     Notes
     -----
     Zehner & Schluender, Chem.-Ing.-Tech. 42 (1970) 933; in the form of VDI Heat Atlas, D6.3, with
-    the shape factor ``B = 1.25 ((1 - eps) / eps)^(10/9)`` of spheres.
+    the shape factor ``B = 1.25 ((1 - eps) / eps)^(10/9)`` of spheres. Contact areas begin to matter
+    where the solid conducts 2000 times better than the gas. Where B equals the ratio of the
+    conductivities the closed form is 0 / 0; there its own power series is summed.
     """
     ks, kg, eps = np.broadcast_arrays(
         *(
@@ -52,10 +67,4 @@ def zehner_schluender(
     kappa = ks / kg
     shape = 1.25 * ((1.0 - eps) / eps) ** (10.0 / 9.0)
     root = np.sqrt(1.0 - eps)
-    close = np.abs(1.0 - shape / kappa) < NEAR
-    # the singularity is removable: between points on both sides the course is straight enough
-    low = _core(np.where(close, shape / (1.0 + 2.0 * NEAR), kappa), shape)
-    high = _core(np.where(close, shape / (1.0 - 2.0 * NEAR), kappa), shape)
-    share = np.where(close, (1.0 - shape / kappa + 2.0 * NEAR) / (4.0 * NEAR), 0.5)
-    core = low + share * (high - low)
-    return kg * (1.0 - root + root * core)
+    return kg * (1.0 - root + root * _core(kappa, shape))

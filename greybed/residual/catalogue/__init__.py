@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
+
+from greybed.core.errors import InputError
 from greybed.residual.catalogue import drag, heat, particles
 from greybed.residual.effect import Effect
 
@@ -28,8 +31,17 @@ def register(effect: Effect, model: str) -> None:
         The effect.
     model : str
         Name of the forward model that it acts in.
+
+    Raises
+    ------
+    InputError
+        If there is no such model.
     """
-    known = _EFFECTS.setdefault(model, [])
+    if model not in _EFFECTS:
+        near = difflib.get_close_matches(str(model), _EFFECTS, n=1, cutoff=0.5)
+        hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(_EFFECTS)}."
+        raise InputError(f"effect {effect.name}: {model!r} is not a known model; {hint}")
+    known = _EFFECTS[model]
     known[:] = [e for e in known if e.name != effect.name] + [effect]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib import import_module
 
 from greybed.core.errors import InputError
@@ -81,7 +82,15 @@ def build(spec: ModelSpec, table: Table, parameters: Mapping[str, float]) -> For
         raise InputError(f"model.name = {spec.name!r} is not a known model; {hint}")
     module, kind = MODELS[spec.name]
     found = getattr(import_module(f"greybed.residual.models.{module}"), kind)
-    model: ForwardModel = found(spec, table, parameters)
+    files = spec.options.get("terms", [])
+    if not isinstance(files, list) or not all(isinstance(file, str) for file in files):
+        raise InputError(f"model.terms = {files!r} must be a list of files in quotes.")
+    own = {key: value for key, value in spec.options.items() if key != "terms"}
+    model: ForwardModel = found(replace(spec, options=own), table, parameters)
+    if files:
+        from greybed.residual.models.terms import WithTerms
+
+        model = WithTerms(model, files, spec.folder, {*table.columns, *parameters})
     return model
 
 

@@ -14,7 +14,10 @@ from greybed.residual.study import Table
 
 
 class BedConductivity(ClosedForm):
-    """Effective conductivity [W/m/K]: Zehner and Schluender's cell, without radiation."""
+    """Effective conductivity [W/m/K]: Zehner and Schluender's cell, without radiation.
+
+    Conductivities are those at ``reference_temperature``, 300 K unless the study says otherwise.
+    """
 
     name = "bed-conductivity"
     response = "conductivity"
@@ -39,6 +42,7 @@ class BedConductivity(ClosedForm):
         if exchange not in ("grey", "black"):
             raise InputError(f"model.exchange = {exchange!r} must be 'grey' or 'black'.")
         self._black = exchange == "black"
+        self._number("reference_temperature", "temperature", 1.0)
 
     def excluded(self, effect: Effect) -> str | None:
         """Emissivity is an effect of its own only where the base radiates as if black."""
@@ -55,10 +59,7 @@ class BedConductivity(ClosedForm):
             c["exchange"] = 1.0 / (2.0 / c["emissivity"] - 1.0)
         else:
             c["exchange"] = np.ones(size)
-        if "reference_temperature" in self.spec.options:
-            c["reference_temperature"] = np.full(
-                size, float(self.spec.options["reference_temperature"])
-            )
+        self._state_temperature(c)
         return c
 
     def evaluate(self, columns: dict[str, Array], active: list[tuple[Effect, float]]) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from abc import abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -10,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from greybed.core.errors import InputError
+from greybed.core.units import parse_quantity
 from greybed.residual.catalogue import effects_for
 from greybed.residual.effect import Array, Columns, Effect
 from greybed.residual.model import ForwardModel, ModelSpec, values
@@ -72,6 +74,23 @@ class ClosedForm(ForwardModel):
         laws = [key for key in LAW_KEYS if key in self.spec.options]
         if len(laws) > 1:
             raise InputError(f"model.{laws[0]} and model.{laws[1]} name the same thing; give one.")
+
+    def _number(self, key: str, dimension: str, default: float) -> float:
+        """An option above 0, given in SI or as text with a unit."""
+        value = self.spec.options.get(key, default)
+        if isinstance(value, str):
+            value = parse_quantity(value, dimension, f"model.{key}")
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise InputError(f"model.{key} = {value!r} must be a number in SI or text with a unit.")
+        if not 0.0 < value < math.inf:
+            raise InputError(f"model.{key} = {value:g} must be above 0 and finite; mend it.")
+        return float(value)
+
+    def _state_temperature(self, c: dict[str, Array]) -> None:
+        """Put the temperature at which properties are stated beside the columns."""
+        if "reference_temperature" in self.spec.options:
+            stated = self._number("reference_temperature", "temperature", 0.0)
+            c["reference_temperature"] = np.full(len(c[self.required[0]]), stated)
 
     def _missing(self, name: str, table: Table, parameters: Mapping[str, float]) -> InputError:
         return InputError(
@@ -141,7 +160,16 @@ class ClosedForm(ForwardModel):
         amplitudes: Mapping[str, float],
     ) -> Array:
         """See :meth:`ForwardModel.predict`."""
-        c = self.complete(values(columns, parameters))
+        with np.errstate(all="ignore"):
+            c = values(columns, parameters)
+            good = np.logical_and.reduce([c[name] > 0.0 for name in self.required])
+            if "void_fraction" in c:
+                good &= c["void_fraction"] < 1.0
+            response = self._respond(self.complete(c), amplitudes)
+            return np.where(good & np.isfinite(response) & (response > 0.0), response, np.nan)
+
+    def _respond(self, c: dict[str, Array], amplitudes: Mapping[str, float]) -> Array:
+        """Effects in the order of their stages, and the law between them."""
         on = {**self.spec.effects, **{k: v for k, v in amplitudes.items() if v != 0.0}}
         later = []
         outcomes = []

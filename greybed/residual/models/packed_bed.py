@@ -16,7 +16,11 @@ from greybed.residual.study import Table
 
 
 class PackedBedPressureDrop(ClosedForm):
-    """Pressure drop per length [Pa/m]: ``18 mu phi F(phi, Re) U / (eps d^2)``."""
+    """Pressure drop per length [Pa/m]: ``18 mu phi F(phi, Re) U / (eps d^2)``.
+
+    ``Re = rho U d / mu``. Velocity and density are those at the outlet; viscosity is that at
+    ``reference_temperature``, 293.15 K unless the study says otherwise.
+    """
 
     name = "packed-bed-pressure-drop"
     response = "pressure_gradient"
@@ -41,6 +45,7 @@ class PackedBedPressureDrop(ClosedForm):
         if density is None:
             density = float(np.median(table.columns["fluid_density"]))
         self._gas = density < GAS
+        self._number("reference_temperature", "temperature", 1.0)
 
     def catalogue(self) -> tuple[Effect, ...]:
         """Gases thicken when warmed and liquids thin out; liquids do not expand."""
@@ -63,10 +68,7 @@ class PackedBedPressureDrop(ClosedForm):
 
     def complete(self, c: dict[str, Array]) -> dict[str, Array]:
         """The temperature at which the viscosity is stated."""
-        if "reference_temperature" in self.spec.options:
-            c["reference_temperature"] = np.full(
-                len(c["viscosity"]), float(self.spec.options["reference_temperature"])
-            )
+        self._state_temperature(c)
         return c
 
     def evaluate(self, columns: dict[str, Array], active: list[tuple[Effect, float]]) -> Array:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from greybed.closures.drag import drag_law
+from greybed.closures.drag import LAWS, drag_law
+from greybed.core.errors import InputError
 from greybed.residual.catalogue.drag import VISCOSITY_GAS
 from greybed.residual.effect import Array, Columns, Effect
 from greybed.residual.models.closed_form import LAW_KEYS, ClosedForm, product
@@ -16,13 +17,17 @@ GRAVITY = 9.80665  # m/s2, standard
 GAS = 100.0  # kg/m3; a lighter fluid is a gas
 ITERATIONS = 60
 SETTLED = 1e-13  # relative change of the velocity
+WIDE = 60.0  # powers of e about Stokes' velocity within which the velocity is looked for
+HALVINGS = 64
 
 
 class TerminalVelocity(ClosedForm):
     """Speed along the net force, positive for rising spheres too [m/s].
 
     Solves ``(rho_p - rho_f) g pi d^3 / 6 = 3 pi mu d v F(0, Re)`` times the factors of effects,
-    with ``Re = rho_f v d / mu``.
+    with ``Re = rho_f v d / mu``. Where a law jumps, as Schiller and Naumann's does at Re = 1000,
+    no velocity balances the forces of some weights, and the velocity of the jump is returned.
+    Viscosity is that at ``reference_temperature``, 293.15 K unless the study says otherwise.
     """
 
     name = "terminal-velocity"
@@ -33,11 +38,18 @@ class TerminalVelocity(ClosedForm):
 
     def _prepare(self, table: Table, parameters: Mapping[str, float]) -> None:
         self._law = drag_law(self.law, "model.drag")
+        if not self._law.sphere:
+            alone = ", ".join(name for name, law in LAWS.items() if not law.bed)
+            raise InputError(
+                f"model.drag = {self.law!r} is a law of packed beds without the limit of one "
+                f"sphere; take one of {alone}."
+            )
         density = parameters.get("fluid_density")
         if density is None:
             density = float(np.median(table.columns["fluid_density"]))
         self._gas = density < GAS
-        self._gravity = float(self.spec.options.get("gravity", GRAVITY))
+        self._gravity = self._number("gravity", "acceleration", GRAVITY)
+        self._number("reference_temperature", "temperature", 1.0)
 
     def catalogue(self) -> tuple[Effect, ...]:
         """Gases thicken when warmed and liquids thin out."""
@@ -62,10 +74,7 @@ class TerminalVelocity(ClosedForm):
         if "mean_free_path" not in c and self._gas and "pressure" in c:
             root = np.sqrt(np.pi / (2.0 * c["pressure"] * c["fluid_density"]))
             c["mean_free_path"] = c["viscosity"] * root
-        if "reference_temperature" in self.spec.options:
-            c["reference_temperature"] = np.full(
-                len(c["diameter"]), float(self.spec.options["reference_temperature"])
-            )
+        self._state_temperature(c)
         return c
 
     def evaluate(self, columns: dict[str, Array], active: list[tuple[Effect, float]]) -> Array:
@@ -95,4 +104,17 @@ class TerminalVelocity(ClosedForm):
                 if not np.any(np.abs(step) > SETTLED):
                     break
             settled = np.abs(excess(new)) < 1e-10
-            return np.where(settled, np.exp(new), np.nan)
+            if not settled.all():
+                new = np.where(settled, new, _halved(excess, start))
+            return np.exp(new)
+
+
+def _halved(excess: Callable[[Array], Array], start: Array) -> Array:
+    """Where the excess changes its sign, also by a jump; NaN where it does not."""
+    low, high = start - WIDE, start + WIDE
+    known = (excess(low) < 0.0) & (excess(high) > 0.0)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        above = excess(middle) > 0.0
+        low, high = np.where(above, low, middle), np.where(above, middle, high)
+    return np.where(known, high, np.nan)
