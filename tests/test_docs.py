@@ -147,6 +147,29 @@ FILES = {
     "outside.dump": DUMP.format(1) + COLUMNS + "1 1 1 2.5 0.5\n",
     "typo.toml": 'kind = "thermal-bed"\n[packing]\nfil = "bed.csv"\n',
 }
+SPHERES = "diameter [mm],velocity [mm/s]\n" + "".join(f"{d},{d * d}\n" for d in range(1, 9))
+STUDY = (
+    '[data]\nfile = "{file}"\nresponse = "velocity"\n[model]\nname = "terminal-velocity"\n{model}'
+    "[parameters]\nparticle_density = 1500.0\nfluid_density = 1100.0\n{viscosity}"
+)
+VISCOSITY = 'viscosity = "0.2 Pa s"\n'
+FILES |= {
+    "spheres.csv": SPHERES,
+    "inches.csv": SPHERES.replace("mm/s", "furlong"),
+    "hole.csv": SPHERES.replace("3,9", "3,nan"),
+    "three.csv": "\n".join(SPHERES.splitlines()[:4]) + "\n",
+    "typed.toml": STUDY.format(file="spheres.csv", model="", viscosity=VISCOSITY).replace(
+        "response", "respons"
+    ),
+    "unit.toml": STUDY.format(file="inches.csv", model="", viscosity=VISCOSITY),
+    "hole.toml": STUDY.format(file="hole.csv", model="", viscosity=VISCOSITY),
+    "thin.toml": STUDY.format(file="spheres.csv", model="", viscosity=""),
+    "effect.toml": STUDY.format(
+        file="spheres.csv", model="effects = { wall = 2.1 }\n", viscosity=VISCOSITY
+    ),
+    "few.toml": STUDY.format(file="three.csv", model="", viscosity=VISCOSITY),
+}
+DIAGNOSED = ("missing", "typed", "unit", "hole", "thin", "effect", "few")
 COMMANDS = [
     "info missing.csv",
     "info empty.csv",
@@ -176,6 +199,7 @@ COMMANDS = [
     "simulate typo.toml --out o",
     "simulate wrong_unit.toml --out o",
     "simulate too_bright.toml --out o",
+    *(f"diagnose {name}.toml --out o" for name in DIAGNOSED),
 ]
 FREE = {"radius_over_distance": 0.25, "radius_ratio": 1.0}
 CALLS = {

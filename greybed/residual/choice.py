@@ -93,7 +93,11 @@ def choose(problem: Problem, found: Search) -> Choice:
             chosen = _smallest(named[0], fits)
     if _kinds(chosen) == {"inside"}:
         # a named effect whose shape is a little off may look like a law of its own
-        mended = [f for f in fits if _kinds(f) == {"effect", "inside"}]
+        own = [f for f in fits if _kinds(f) == {"effect"}]
+        near = [f for f in own if _shape_gap(found.null, chosen, f) < DECISIVE]
+        if near:
+            chosen = _smallest(near[0], fits)
+        mended = [f for f in fits if not near and _kinds(f) == {"effect", "inside"}]
         if mended and log_odds(fits[0]) - log_odds(mended[0]) < DECISIVE:
             _, small = _without_form_error(problem, mended[0], fits)
             chosen = mended[0] if small is not None else chosen
@@ -103,7 +107,9 @@ def choose(problem: Problem, found: Search) -> Choice:
     for made in fits:
         if made is chosen or _gap(found, fits, chosen, made, top) > DECISIVE:
             continue
-        if _inside(made) > _inside(chosen) and not _moves(problem, chosen, made):
+        if _inside(made) > _inside(chosen) and (
+            _kinds(chosen) != {"effect"} or not _moves(problem, chosen, made)
+        ):
             continue
         if any(_inside(r) < _inside(made) for r in rivals):
             continue
@@ -142,11 +148,19 @@ def _gap(found: Search, fits: tuple[Fit, ...], chosen: Fit, made: Fit, top: floa
     without = next((f for f in (found.null, *fits) if _inside(f) == common), None)
     if without is None:
         return gap
+    return gap + _shape_gap(without, chosen, made) - (log_odds(chosen) - log_odds(made))
+
+
+def _shape_gap(without: Fit, chosen: Fit, made: Fit) -> float:
+    """Log odds of ``chosen`` against ``made``, shapes trusted to ``FORM`` of the effect.
+
+    ``without`` is the fit without what the two are about.
+    """
     own = float(np.sqrt(np.mean((chosen.fitted - without.fitted) ** 2)))
     apart = float(np.sqrt(np.mean((chosen.fitted - made.fitted) ** 2)))
     from_data = max(chosen.log_likelihood - made.log_likelihood, 0.0)
     trusted = 0.5 * (apart / max(FORM * own, 1e-300)) ** 2
-    return gap - from_data + min(from_data, trusted)
+    return log_odds(chosen) - log_odds(made) - from_data + min(from_data, trusted)
 
 
 def _without_trifles(found: Search, fits: tuple[Fit, ...], chosen: Fit) -> list[Fit]:
@@ -159,11 +173,7 @@ def _without_trifles(found: Search, fits: tuple[Fit, ...], chosen: Fit) -> list[
     for made in fits:
         if not made.terms or not _inside(made) < _inside(chosen) or _kinds(chosen) != {"effect"}:
             continue
-        whole = float(np.sqrt(np.mean((chosen.fitted - found.null.fitted) ** 2)))
-        apart = float(np.sqrt(np.mean((chosen.fitted - made.fitted) ** 2)))
-        from_data = max(chosen.log_likelihood - made.log_likelihood, 0.0)
-        trusted = 0.5 * (apart / max(FORM * whole, 1e-300)) ** 2
-        if log_odds(chosen) - log_odds(made) - from_data + min(from_data, trusted) < EACH_MORE:
+        if _shape_gap(found.null, chosen, made) < EACH_MORE:
             smaller.append(made)
     return smaller
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from greybed.residual.choice import choose
 from greybed.residual.diagnosis import Errors, Score
@@ -71,7 +72,8 @@ def hold_out(seen: Look, critical: float) -> HeldOut:
     out = {name: np.full(n, np.nan) for name in ("base", "recalibrated", "effect", "gp")}
     nothing = np.zeros(len(problem.names))
     discrepancy = Discrepancy(problem, problem.z - problem.predict(nothing, {}))
-    for k in np.unique(fold):
+
+    def one(k: int) -> None:
         test = fold == k
         train, rest = problem.take(~test), problem.take(test)
         out["base"][test] = rest.predict(nothing, {})
@@ -88,6 +90,11 @@ def hold_out(seen: Look, critical: float) -> HeldOut:
             out["effect"][test] = predict(rest, best.terms, best.u)
         else:  # nothing is missing: the base as it is, with its free parameters calibrated
             out["effect"][test] = rest.predict(part.t, {})
+
+    # the matrices are small: more threads for each cost more than they gain
+    with threadpool_limits(1):
+        for k in np.unique(fold):
+            one(k)
     return HeldOut(out["base"], out["recalibrated"], out["effect"], out["gp"], fold, text)
 
 

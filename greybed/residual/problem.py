@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -97,8 +96,7 @@ class Problem:
     ) -> Array:
         """Transformed prediction, shape (n,); NaN where the model fails."""
         columns = self.columns if columns is None else columns
-        with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore", RuntimeWarning)
+        with np.errstate(all="ignore"):
             response = self.model.predict(columns, self.parameters(t), amplitudes)
             return np.log(response) if self.model.transform == "log" else response
 

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class DragLaw:
-    """One law.
+    """One published drag law.
 
     Attributes
     ----------
