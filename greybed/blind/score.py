@@ -17,6 +17,7 @@ QUIET = ("none", "not-identifiable")
 EXPONENT = 0.2
 TENTH = 0.1
 PLAIN = 5.0  # standard errors
+FEWEST = 20  # sets from which a bar is judged
 
 
 @dataclass(frozen=True)
@@ -136,7 +137,7 @@ def score(rows: Sequence[Row], alpha: float) -> list[Line]:
     Returns
     -------
     lines : list of Line
-        ``met`` is None where the rows are too few to say.
+        ``met`` is None for fewer than ``FEWEST`` sets.
     """
     lines = []
 
@@ -145,7 +146,7 @@ def score(rows: Sequence[Row], alpha: float) -> list[Line]:
     ) -> None:
         count, value, ends = _share(chosen, test)
         said = f"{'>=' if above else '<='} {100 * bar:.3g} %"
-        met = None if not count else (value >= bar if above else value <= bar)
+        met = None if count < FEWEST else (value >= bar if above else value <= bar)
         lines.append(Line(what, count, value, ends, said, met))
 
     def kind(*names: str) -> list[Row]:
@@ -245,7 +246,7 @@ def score(rows: Sequence[Row], alpha: float) -> list[Line]:
             median,
             (float(ends[0]), float(ends[1])),
             ">= 95 %",
-            median >= 0.95 if fractions else None,
+            median >= 0.95 if len(fractions) >= FEWEST else None,
         )
     )
     hits = [hit for r in rows if r["found"]["verdict"] == "effect" for hit in _covered(r)]
@@ -257,7 +258,7 @@ def score(rows: Sequence[Row], alpha: float) -> list[Line]:
             covered,
             wilson(sum(hits), len(hits)),
             "92 to 98 %",
-            0.92 <= covered <= 0.98 if hits else None,
+            0.92 <= covered <= 0.98 if len(hits) >= FEWEST else None,
         )
     )
     return lines

@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 
 MOST_FOLDS = 20
 ROW_FOLDS = 10  # where there are no groups
+FEWEST_GROUPS = 3  # fewer cannot be left out one at a time
 RESAMPLES = 1000
 
 
@@ -38,8 +39,8 @@ class HeldOut:
 def _folds(problem: Problem, seed: int) -> tuple[NDArray[np.int64], str]:
     study = problem.study
     n = len(problem)
-    if study.options.holdout == "group" and problem.grouped:
-        groups, own = np.unique(problem.group, return_inverse=True)
+    groups, own = np.unique(problem.group, return_inverse=True)
+    if study.options.holdout == "group" and problem.grouped and len(groups) >= FEWEST_GROUPS:
         name = " and ".join(study.group)
         if len(groups) <= MOST_FOLDS:
             return own, f"leave one group out ({len(groups)} groups by {name})"

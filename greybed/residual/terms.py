@@ -141,7 +141,8 @@ def _power_term(kind: str, name: str, values: Array, log_prior: float) -> Term:
 def _label_values(problem: Problem) -> list[tuple[str, str, Array]]:
     found = []
     # the error of a group is part of the noise already
-    names = [n for n in (*problem.study.labels, *problem.labels) if n not in problem.study.group]
+    known = {*problem.study.group, problem.study.replicate}
+    names = [n for n in (*problem.study.labels, *problem.labels) if n not in known]
     for name in dict.fromkeys(names):
         words = np.array(problem.labels[name])
         values, counts = np.unique(words, return_counts=True)

@@ -103,6 +103,18 @@ def test_one_parameter_that_absorbs_everything_leaves_nothing_identifiable():
     assert "shape" in found.not_identifiable
 
 
+@pytest.mark.parametrize("group", [60, 30])
+def test_groups_too_few_to_leave_out_fall_back_on_rows(group):
+    found = diagnose(spheres(21, n=60, group=group))
+    assert "of the rows" in found.error.holdout
+
+
+def test_a_group_with_one_row_is_a_group():
+    found = diagnose(spheres(22, n=21, group=5))
+    assert "5 groups" in found.error.holdout
+    assert np.isfinite(found.error.with_effect.value)
+
+
 def test_groups_that_differ_are_no_effect():
     alarms = [
         diagnose(spheres(s, n=40, group=5, group_noise=0.04)).verdict for s in range(100, 110)

@@ -119,7 +119,8 @@ SPHERE = (
         name="turbulence",
         law="drag * (1 + A u' / u)",
         source="linear in the intensity after Uhlherr & Sinclair (1970), as in Clift, Grace & "
-        "Weber, Bubbles, Drops and Particles, chapter 10; the size depends on the scales",
+        "Weber, Bubbles, Drops and Particles, chapter 10 (from memory, source not reached); the "
+        "size depends on the scales",
         group="turbulence intensity",
         theory=None,
         low=0.05,
@@ -180,7 +181,7 @@ BED = (
         law="viscous part * a^2, inertial part * a / b, a = 1 + A d / (D phi), "
         "b = (1 + 1.32 (d / D)^2 A / (2/3))^2",
         source="Eisfeld & Schnitzlein, Chem. Eng. Sci. 56 (2001) 4321; a with A = 2/3 is Mehta & "
-        "Hawley's (1969)",
+        "Hawley's (1969); constants as commonly quoted, source not reached",
         group="d / (D phi)",
         theory=2.0 / 3.0,
         spread=0.2,
