@@ -13,8 +13,8 @@ from typing import Any
 from greybed.core.config import read_toml
 from greybed.core.errors import InputError
 from greybed.core.units import parse_quantity, parse_to_base
+from greybed.residual.columns import DIMENSIONS
 from greybed.residual.model import ModelSpec
-from greybed.residual.models import DIMENSIONS
 from greybed.residual.study import Noise, Options, Parameter, Study, Table
 from greybed.residual.table import read_table
 

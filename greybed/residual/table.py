@@ -13,7 +13,7 @@ import numpy as np
 
 from greybed.core.errors import InputError
 from greybed.core.units import to_base, to_si
-from greybed.residual.models import DIMENSIONS
+from greybed.residual.columns import DIMENSIONS
 from greybed.residual.study import Table
 
 _CELL = re.compile(r"\s*(?P<name>[^\[\](]*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?\s*")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,8 +12,9 @@ from hypothesis import strategies as st
 from greybed.core.errors import InputError
 from greybed.residual import Effect, Table
 from greybed.residual.catalogue import effects_for, register
+from greybed.residual.columns import DIMENSIONS
 from greybed.residual.model import ModelSpec
-from greybed.residual.models import DIMENSIONS, build
+from greybed.residual.models import build
 
 N = 12
 RNG = np.random.default_rng(5)
@@ -250,3 +253,16 @@ def test_known_columns_have_known_dimensions():
     from greybed.core.units import DIMENSIONS as UNITS
 
     assert set(DIMENSIONS.values()) <= set(UNITS)
+
+
+def test_parameters_that_the_model_does_not_use_are_refused():
+    table = Table(columns=SPHERES, units={}, rows=np.arange(N))
+    with pytest.raises(InputError, match=r"parameters\.viscosty is not used .* 'viscosity'"):
+        build(ModelSpec(name="terminal-velocity"), table, {"viscosty": 0.2})
+
+
+def test_the_page_of_effects_is_the_catalogue():
+    page = (Path(__file__).parents[2] / "docs/effects.md").read_text()
+    for model in (*TABLES, "python"):
+        for effect in effects_for(model):
+            assert f"| `{effect.name}` | {effect.law} |" in page, effect.name

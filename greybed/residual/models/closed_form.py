@@ -13,6 +13,7 @@ import numpy as np
 from greybed.core.errors import InputError
 from greybed.core.units import parse_quantity
 from greybed.residual.catalogue import effects_for
+from greybed.residual.columns import DIMENSIONS
 from greybed.residual.effect import Array, Columns, Effect
 from greybed.residual.model import ForwardModel, ModelSpec, values
 from greybed.residual.study import Table
@@ -49,6 +50,13 @@ class ClosedForm(ForwardModel):
         for name in self.required:
             if name not in given:
                 raise self._missing(name, table, parameters)
+        known = {*DIMENSIONS, *(c for e in effects_for(self.name) for c in e.columns)}
+        for name in parameters:
+            if name not in known:
+                near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+                said = ", ".join(self.required)
+                hint = f"did you mean {near[0]!r}?" if near else f"it takes {said}."
+                raise InputError(f"parameters.{name} is not used by {self.name}; {hint}")
         for name in parameters:
             column = table.columns.get(name)
             if column is not None and np.ptp(column) > 1e-9 * np.max(np.abs(column)):
