@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 MOST_TERMS = 3
 THRESHOLDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
 FOLDS = 5
+ABSORBED = 1e-6  # share of a signature that must be left after projection
 
 
 def library(folder: Path) -> tuple[list[str], Array, Array]:
@@ -47,8 +48,13 @@ def library(folder: Path) -> tuple[list[str], Array, Array]:
     if free.any():
         slopes = problem.slopes(t, {})[:, free]
         basis = np.linalg.qr(slopes)[0]
+        size = np.linalg.norm(matrix, axis=0)
         matrix = matrix - basis @ (basis.T @ matrix)
         residual = residual - basis @ (basis.T @ residual)
+        # what calibration stands in for leaves rounding only, which no regression may scale up
+        kept = np.linalg.norm(matrix, axis=0) > ABSORBED * size
+        names = [name for name, keep in zip(names, kept, strict=True) if keep]
+        matrix = matrix[:, kept]
     return names, matrix, residual
 
 
