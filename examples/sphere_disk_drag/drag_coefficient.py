@@ -1,4 +1,4 @@
-"""Standard drag coefficients of spheres and of disks held across the flow, and what may be added."""
+"""Standard drag coefficients of spheres and of disks across the flow, and what may be added."""
 
 import numpy as np
 
