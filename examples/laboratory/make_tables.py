@@ -1,22 +1,23 @@
-"""Runs the silo in LIGGGHTS and writes its tables: rough_walls.csv and smooth_walls.csv.
+"""Runs the laboratory in LIGGGHTS and writes its tables.
 
-Needs ``liggghts`` (Debian package of that name, 3.8.0 used); about eight minutes on one core.
-Run: python make_tables.py [folder]
+Needs ``liggghts`` (Debian package of that name, 3.8.0 used); about ten minutes on one core.
+Run: python make_tables.py [silo] [impact] [--out FOLDER]
 """
 
+import argparse
 import math
 import re
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
+import numpy as np
+
 HERE = Path(__file__).parent
-SPHERE = 0.0025  # radius [m]
-DENSITY = 2500.0  # [kg/m3]
-ROUGH = 0.5  # coefficient of friction between sphere and wall
 SEEDS = ((100003, 200003), (100019, 200017), (100043, 200023))
-# radius of the silo [m], number of spheres, height to pour from [m]
+DENSITY = 2500.0  # [kg/m3]
+
+# silo: radius [m], number of spheres, height to pour from [m]
 FILLS = (
     (0.015, 150, 0.07),
     (0.015, 300, 0.12),
@@ -26,36 +27,73 @@ FILLS = (
     (0.02, 700, 0.15),
     (0.02, 1300, 0.27),
 )
+SPHERE = 0.0025  # radius [m]
+ROUGH = 0.5  # coefficient of friction between sphere and wall
+
+# impact: speeds of approach [m/s], series at each, shots of a series, how far they miss (sd) [m]
+SPEEDS = (0.02, 0.035, 0.06, 0.1, 0.17, 0.3, 0.5, 0.8, 1.3, 2.0)
+SERIES = 4
+SHOTS = 5
+MISS = 2.5e-4
 
 
-def measure(
-    radius: float, count: int, top: float, friction: float, seeds: tuple[int, int]
-) -> tuple[int, float, float]:
-    """Spheres, force on the floor [N] and height of the highest point [m] of one settled column."""
-    values = {
-        "seed": seeds[0],
-        "seed2": seeds[1],
-        "count": count,
-        "friction": friction,
-        "radius": radius,
-        "top": top,
-    }
-    words = [word for key, value in values.items() for word in ("-var", key, str(value))]
+def run(deck: str, **variables: float) -> list[list[float]]:
+    """Numbers of every line ``MEASURED`` that a deck prints."""
+    words = [word for key, value in variables.items() for word in ("-var", key, str(value))]
     with tempfile.TemporaryDirectory() as folder:
         ran = subprocess.run(
-            ["liggghts", "-in", str(HERE / "silo.in"), "-log", "none", *words],
+            ["liggghts", "-in", str(HERE / deck), "-log", "none", *words],
             cwd=folder,
             capture_output=True,
             text=True,
-            check=True,
+            check=False,
         )
-    found = re.search(r"^MEASURED (\S+) (\S+) (\S+)$", ran.stdout, re.M)
-    if found is None:
+    found = re.findall(r"^MEASURED (.*)$", ran.stdout, re.M)
+    if ran.returncode or not found:
         raise RuntimeError(ran.stdout[-2000:])
-    return int(float(found[1])), float(found[2]), float(found[3]) + SPHERE
+    return [[float(word) for word in line.split()] for line in found]
 
 
-def main(folder: Path) -> None:
+def measure_silo(
+    radius: float, count: int, top: float, friction: float, seeds: tuple[int, int]
+) -> tuple[int, float, float]:
+    """Spheres, force on the floor [N] and height [m] of one fill."""
+    ((spheres, force, height),) = run(
+        "silo.in",
+        seed=seeds[0],
+        seed2=seeds[1],
+        count=count,
+        friction=friction,
+        radius=radius,
+        top=top,
+    )
+    return int(spheres), force, height
+
+
+def measure_impact(speed: float, across: float, above: float, viscous: bool) -> float:
+    """Speed of parting over speed of approach, along the line of approach [-]."""
+    radius, stiffness = 0.002, 1.33e8
+    mass = 0.5 * DENSITY * 4.0 / 3.0 * math.pi * radius**3
+    # contact of Hertz spheres (Johnson, Contact Mechanics, section 11.4), in 2000 steps
+    spring = stiffness * math.sqrt(0.5 * radius)
+    contact = 2.94 * (1.25 * mass / spring) ** 0.4 * speed**-0.2
+    step = contact / 2000.0
+    ((parting,),) = run(
+        "impact.in",
+        law=int(viscous),
+        speed=speed,
+        across=across,
+        above=above,
+        step=step,
+        steps=int((1.4e-4 / speed + 2.0 * contact) / step),
+    )
+    if parting <= 0.0:
+        raise RuntimeError(f"at {speed} m/s the spheres have not parted")
+    return parting / speed
+
+
+def silo(folder: Path) -> None:
+    """``rough_walls.csv`` and ``smooth_walls.csv``."""
     mass = DENSITY * 4.0 / 3.0 * math.pi * SPHERE**3
     for name, friction in (("rough_walls", ROUGH), ("smooth_walls", 0.0)):
         with open(folder / f"{name}.csv", "w") as stream:
@@ -64,7 +102,7 @@ def main(folder: Path) -> None:
             )
             for number, (radius, count, top) in enumerate(FILLS):
                 for seeds in SEEDS:
-                    spheres, force, height = measure(radius, count, top, friction, seeds)
+                    spheres, force, height = measure_silo(radius, count, top, friction, seeds)
                     stream.write(
                         f"{2e3 * radius:g},{1e3 * height:.5g},{1e3 * mass * spheres:.6g},"
                         f"{force / (math.pi * radius**2):.6g},F{number + 1},{seeds[0]}\n"
@@ -72,5 +110,27 @@ def main(folder: Path) -> None:
                     stream.flush()
 
 
+def impact(folder: Path) -> None:
+    """``viscous_impacts.csv`` and ``constant_impacts.csv``."""
+    for name, viscous in (("viscous_impacts", True), ("constant_impacts", False)):
+        with open(folder / f"{name}.csv", "w") as stream:
+            stream.write("impact_velocity [m/s],restitution,series,seed\n")
+            for number, speed in enumerate(SPEEDS):
+                for series in range(SERIES):
+                    seed = 1000 * (number + 1) + 10 * series + viscous
+                    aims = MISS * np.random.default_rng(seed).standard_normal((SHOTS, 2))
+                    found = [measure_impact(speed, x, y, viscous) for x, y in aims]
+                    stream.write(f"{speed:g},{np.mean(found):.5f},{series + 1},{seed}\n")
+                    stream.flush()
+
+
+LABORATORIES = {"silo": silo, "impact": impact}
+
+
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE)
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", default=list(LABORATORIES))
+    parser.add_argument("--out", type=Path, default=HERE)
+    wanted = parser.parse_args()
+    for wanted_name in wanted.names:
+        LABORATORIES[wanted_name](wanted.out)

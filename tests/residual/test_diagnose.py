@@ -181,11 +181,19 @@ def test_standard_drag_coefficients_get_no_invented_effect(body):
     assert found.effects == ()
 
 
-@pytest.mark.parametrize(("walls", "verdict"), [("rough", "effect"), ("smooth", "none")])
-def test_the_silo_of_another_simulator(walls, verdict):
-    found = diagnose(read_study(EXAMPLES / f"laboratory/study_{walls}.toml"))
-    assert found.verdict == verdict
-    assert names(found) == ({"wall-friction"} if verdict == "effect" else set())
+@pytest.mark.parametrize(
+    ("rig", "named"),
+    [
+        ("rough", {"wall-friction"}),
+        ("smooth", set()),
+        ("viscous", {"velocity-dependent-restitution"}),
+        ("constant", set()),
+    ],
+)
+def test_the_laboratory_of_another_simulator(rig, named):
+    found = diagnose(read_study(EXAMPLES / f"laboratory/study_{rig}.toml"))
+    assert found.verdict == ("effect" if named else "none")
+    assert names(found) == named
 
 
 def test_a_model_for_another_response_is_refused():
