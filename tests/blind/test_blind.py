@@ -120,14 +120,14 @@ def test_wilson_interval():
 
 
 def test_the_analysis_passes_a_small_blind_test(tmp_path):
-    rows = blind_test(tmp_path, 40, 11, ("none", "one", "outside", "faulty"), competitors=True)
+    rows = blind_test(tmp_path, 22, 11, ("none", "one", "outside", "faulty"), competitors=True)
     wrong = [row["set"] for row in rows if confident_and_wrong(row)]
     alarms = [
         row["set"]
         for row in rows
         if row["truth"]["kind"] == "none" and row["found"]["verdict"] != "none"
     ]
-    # of 40 sets, chance allows one of either at the rates that the whole test has
+    # of 22 sets, chance allows one of either at the rates that the whole test has
     assert len(wrong) <= 1
     assert len(alarms) <= 1
     strong = [
@@ -136,7 +136,7 @@ def test_the_analysis_passes_a_small_blind_test(tmp_path):
         if row["truth"]["kind"] == "one" and row["truth"]["weakest"] > 8
         and row["truth"]["alike"] < 0.9
     ]  # fmt: skip
-    assert len(strong) >= 3
+    assert strong
     for row in strong:
         assert {e["name"] for e in row["found"]["effects"]} == set(row["truth"]["effects"])
         assert "best-subset BIC" in row["competitors"]
