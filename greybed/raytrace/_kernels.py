@@ -5,6 +5,8 @@ import math
 import numpy as np
 from numba import njit
 
+from greybed.raytrace._walls import behind, wall_hit
+
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 # Keys of the tallies: spheres are their number plus the coded image, walls -1 - k, escape this.
@@ -67,40 +69,6 @@ def _emit(state):
     py = u * (sign * b) + v * (sign + dy * dy * a) + lift * dy
     pz = u * (-sign * dx) - v * dy + lift * dz
     return dx, dy, dz, px, py, pz, state
-
-
-@njit(**_OPTIONS)
-def _wall_hit(ox, oy, oz, dx, dy, dz, planes, cylinders):
-    """Nearest wall ahead: distance (inf where none) and wall number, planes first."""
-    nearest, wall = np.inf, -1
-    for k in range(planes.shape[0]):
-        towards = dx * planes[k, 3] + dy * planes[k, 4] + dz * planes[k, 5]
-        if towards < 0.0:
-            height = (
-                (ox - planes[k, 0]) * planes[k, 3]
-                + (oy - planes[k, 1]) * planes[k, 4]
-                + (oz - planes[k, 2]) * planes[k, 5]
-            )
-            t = -height / towards
-            if t < nearest:
-                nearest, wall = t, k
-    for k in range(cylinders.shape[0]):
-        ax, ay, az = cylinders[k, 3], cylinders[k, 4], cylinders[k, 5]
-        rx, ry, rz = ox - cylinders[k, 0], oy - cylinders[k, 1], oz - cylinders[k, 2]
-        along_d = dx * ax + dy * ay + dz * az
-        along_r = rx * ax + ry * ay + rz * az
-        ux, uy, uz = dx - along_d * ax, dy - along_d * ay, dz - along_d * az
-        qx, qy, qz = rx - along_r * ax, ry - along_r * ay, rz - along_r * az
-        a = ux * ux + uy * uy + uz * uz
-        if a > 0.0:
-            b = qx * ux + qy * uy + qz * uz
-            c = qx * qx + qy * qy + qz * qz - cylinders[k, 6] ** 2
-            root = b * b - a * c
-            if root > 0.0:
-                t = (math.sqrt(root) - b) / a
-                if t < nearest:
-                    nearest, wall = t, planes.shape[0] + k
-    return nearest, wall
 
 
 @njit(**_OPTIONS)
@@ -196,7 +164,7 @@ def march(ox, oy, oz, dx, dy, dz, limit, frame, start, items):
 
 
 @njit(**_OPTIONS)
-def _buried(x, y, z, frame, start, items, planes, cylinders):
+def _buried(x, y, z, frame, start, items, walls):
     """Whether a surface point lies inside another sphere or behind a wall."""
     low, inverse = frame.low, frame.inverse
     ix = _cell_of(x, low[0], inverse[0], frame.nx)
@@ -208,20 +176,7 @@ def _buried(x, y, z, frame, start, items, planes, cylinders):
         # The emitter itself is in the list, at its radius but for rounding.
         if qx * qx + qy * qy + qz * qz < items[k + 3] * (1.0 - 1e-9):
             return True
-    for k in range(planes.shape[0]):
-        height = (
-            (x - planes[k, 0]) * planes[k, 3]
-            + (y - planes[k, 1]) * planes[k, 4]
-            + (z - planes[k, 2]) * planes[k, 5]
-        )
-        if height < 0.0:
-            return True
-    for k in range(cylinders.shape[0]):
-        qx, qy, qz = x - cylinders[k, 0], y - cylinders[k, 1], z - cylinders[k, 2]
-        along = qx * cylinders[k, 3] + qy * cylinders[k, 4] + qz * cylinders[k, 5]
-        if qx * qx + qy * qy + qz * qz - along * along > cylinders[k, 6] ** 2:
-            return True
-    return False
+    return behind(x, y, z, walls)
 
 
 @njit(**_OPTIONS)
@@ -251,7 +206,7 @@ def _count(key, keys, counts, slots, used, mask):
 
 @njit(**_OPTIONS)
 def trace_sphere(
-    sphere, first_ray, last_ray, seed, centre, radius, exposed, images, grid, planes, cylinders,
+    sphere, first_ray, last_ray, seed, centre, radius, exposed, images, grid, walls,
     limit, keys, counts, slots,
 ):  # fmt: skip
     """Trace rays [first_ray, last_ray) of one sphere into the table ``keys``, ``counts``.
@@ -275,14 +230,16 @@ def trace_sphere(
             ox, sx = _wrapped(centre[0] + radius * ox, low[0], edge[0], periodic[0])
             oy, sy = _wrapped(centre[1] + radius * oy, low[1], edge[1], periodic[1])
             oz, sz = _wrapped(centre[2] + radius * oz, low[2], edge[2], periodic[2])
-            if exposed or not _buried(ox, oy, oz, frame, start, items, planes, cylinders):
+            if exposed or not _buried(ox, oy, oz, frame, start, items, walls):
                 break
             attempt += 1
             if attempt == MAX_ATTEMPTS:
                 return used, -1
         rejected += attempt
-        behind, wall = _wall_hit(ox, oy, oz, dx, dy, dz, planes, cylinders)
-        _, item, mx, my, mz = march(ox, oy, oz, dx, dy, dz, min(limit, behind), frame, start, items)
+        at_wall, wall = wall_hit(ox, oy, oz, dx, dy, dz, walls)
+        _, item, mx, my, mz = march(
+            ox, oy, oz, dx, dy, dz, min(limit, at_wall), frame, start, items
+        )
         if item >= 0:
             key = np.int64(owner[item])
             if images:
@@ -290,7 +247,7 @@ def trace_sphere(
                 cy = sy + my + np.int64(image[3 * item + 1]) + IMAGE_SPAN // 2
                 cz = sz + mz + np.int64(image[3 * item + 2]) + IMAGE_SPAN // 2
                 key += ((cx * IMAGE_SPAN + cy) * IMAGE_SPAN + cz) << 32
-        elif wall >= 0 and behind <= limit:
+        elif wall >= 0 and at_wall <= limit:
             key = np.int64(-1 - wall)
         else:
             key = np.int64(ESCAPED)
@@ -300,7 +257,7 @@ def trace_sphere(
 
 @njit(**_OPTIONS)
 def trace_block(
-    tasks, seed, centres, radii, exposed, images, grid, planes, cylinders, limit, keys, counts,
+    tasks, seed, centres, radii, exposed, images, grid, walls, limit, keys, counts,
     slots, out_keys, out_counts, ends, rejected,
 ):  # fmt: skip
     """Trace tasks (sphere, first ray, last ray), one after the other, and store their tallies.
@@ -314,7 +271,7 @@ def trace_block(
         i = tasks[k, 0]
         used, rejected[k] = trace_sphere(
             i, tasks[k, 1], tasks[k, 2], seed, centres[i], radii[i], exposed[i], images, grid,
-            planes, cylinders, limit, keys, counts, slots,
+            walls, limit, keys, counts, slots,
         )  # fmt: skip
         if filled + used > out_keys.size:
             return k
@@ -339,20 +296,20 @@ def _into_box(position, low, edge, periodic):
 
 
 @njit(**_OPTIONS)
-def first_hits(origins, directions, grid, planes, cylinders, distance, owner):
+def first_hits(origins, directions, grid, walls, distance, owner):
     """Nearest sphere or wall of free rays: ``distance`` (inf where none) and ``owner``.
 
     ``owner`` is the sphere, -1 - k for wall k, and -1 - n_walls for nothing.
     """
     frame, start, items, owners, _ = grid
-    nothing = -1 - planes.shape[0] - cylinders.shape[0]
+    nothing = -1 - walls.total
     for k in range(origins.shape[0]):
         ox, oy, oz = origins[k, 0], origins[k, 1], origins[k, 2]
         dx, dy, dz = directions[k, 0], directions[k, 1], directions[k, 2]
-        behind, wall = _wall_hit(ox, oy, oz, dx, dy, dz, planes, cylinders)
+        at_wall, wall = wall_hit(ox, oy, oz, dx, dy, dz, walls)
         owner[k] = -1 - wall if wall >= 0 else nothing
         # An origin outside the grid first moves to where the ray enters it.
-        enter, leave = 0.0, behind
+        enter, leave = 0.0, at_wall
         for axis in range(3):
             o, d = origins[k, axis], directions[k, axis]
             low, high = frame.low[axis], frame.low[axis] + frame.edge[axis]
@@ -365,13 +322,13 @@ def first_hits(origins, directions, grid, planes, cylinders, distance, owner):
             near, far = (low - o) / d, (high - o) / d
             enter = max(enter, min(near, far))
             leave = min(leave, max(near, far))
-        distance[k] = behind
+        distance[k] = at_wall
         if enter > leave:
             continue
         ox = _into_box(ox + enter * dx, frame.low[0], frame.edge[0], frame.periodic[0])
         oy = _into_box(oy + enter * dy, frame.low[1], frame.edge[1], frame.periodic[1])
         oz = _into_box(oz + enter * dz, frame.low[2], frame.edge[2], frame.periodic[2])
-        t, item, _, _, _ = march(ox, oy, oz, dx, dy, dz, behind - enter, frame, start, items)
+        t, item, _, _, _ = march(ox, oy, oz, dx, dy, dz, at_wall - enter, frame, start, items)
         if item >= 0:
             distance[k] = t + enter
             owner[k] = owners[item]

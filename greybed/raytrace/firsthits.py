@@ -40,7 +40,5 @@ def first_hits(
         raise InputError("origins and directions must be finite, directions longer than zero.")
     scene = Scene.of(packing)
     distance, owner = np.empty(len(o)), np.empty(len(o), np.int64)
-    _kernels.first_hits(o, d / length, scene.grid, scene.planes, scene.cylinders, distance, owner)
-    walls = (owner < 0) & (owner >= -packing.n_walls)
-    owner[walls] = -1 - scene.wall_order[-1 - owner[walls]]
+    _kernels.first_hits(o, d / length, scene.grid, scene.walls, distance, owner)
     return distance, owner

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from greybed.core import Cylinder, InputError, Packing, Plane
-from greybed.raytrace import _grid
+from greybed.raytrace import _grid, _walls
 
 # Cell edge over mean radius. Measured at solid fractions 0.2 and 0.5: the rate varies by less than
 # a tenth between 1.0 and 2.0, and memory falls with the cube.
@@ -23,10 +23,8 @@ class Scene:
 
     packing: Packing
     grid: _grid.Grid
-    planes: NDArray[np.float64]
-    cylinders: NDArray[np.float64]
+    walls: _walls.Walls
     exposed: NDArray[np.bool_]
-    wall_order: NDArray[np.int64]
 
     @classmethod
     def of(cls, packing: Packing) -> Scene:
@@ -49,15 +47,11 @@ class Scene:
             size, float((np.prod(high - low) / (MAX_CELLS_PER_SPHERE * len(packing))) ** (1 / 3))
         )
         grid = _grid.build(packing.centres, packing.radii, low, high, periodic, size)
-        planes = [(k, w) for k, w in enumerate(packing.walls) if isinstance(w, Plane)]
-        cylinders = [(k, w) for k, w in enumerate(packing.walls) if isinstance(w, Cylinder)]
         return cls(
             packing,
             grid,
-            np.array([w.point + w.normal for _, w in planes]).reshape(-1, 6),
-            np.array([(*w.point, *w.axis, w.radius) for _, w in cylinders]).reshape(-1, 7),
+            _walls.tables(packing.walls),
             _exposed(packing),
-            np.array([k for k, _ in planes + cylinders], dtype=np.int64),
         )
 
 

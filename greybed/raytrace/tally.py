@@ -197,7 +197,7 @@ def _trace_tasks(
         keys, counts = np.empty(room, np.int64), np.empty(room, np.int64)
         done = _kernels.trace_block(
             tasks, seed, packing.centres, packing.radii, scene.exposed, images, scene.grid,
-            scene.planes, scene.cylinders, limit, *table, keys, counts, ends, lost,
+            scene.walls, limit, *table, keys, counts, ends, lost,
         )  # fmt: skip
         if done == len(tasks):
             break
@@ -209,8 +209,6 @@ def _trace_tasks(
             f"surface in {_kernels.MAX_ATTEMPTS} attempts); remove it or its duplicate."
         )
     keys, counts = keys[: ends[-1]].copy(), counts[: ends[-1]].copy()
-    walls = (keys < 0) & (keys != _kernels.ESCAPED)
-    keys[walls] = -1 - scene.wall_order[-1 - keys[walls]]
     return keys, counts, ends, lost
 
 
