@@ -1,25 +1,27 @@
 """Monte-Carlo ray tracing of packings: view and exchange factors, each with its standard error."""
 
-from greybed.raytrace.exchange import (
+from greybed.raytrace.exchange import exchange_factors, exchange_of_rays
+from greybed.raytrace.exchange_results import (
     ExchangeFactors,
     ExchangeRows,
     ImagePairs,
     RayShares,
-    exchange_factors,
-    exchange_of_rays,
 )
 from greybed.raytrace.firsthits import first_hits
+from greybed.raytrace.macroscopic import RadiativeExchangeFactor, radiative_exchange_factor
 from greybed.raytrace.viewfactors import ViewFactors, standard_error, view_factors
 
 __all__ = [
     "ExchangeFactors",
     "ExchangeRows",
     "ImagePairs",
+    "RadiativeExchangeFactor",
     "RayShares",
     "ViewFactors",
     "exchange_factors",
     "exchange_of_rays",
     "first_hits",
+    "radiative_exchange_factor",
     "standard_error",
     "view_factors",
 ]
