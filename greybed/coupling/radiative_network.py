@@ -285,7 +285,7 @@ def _nodes(
         if not np.allclose(w, w.T, rtol=1e-9, atol=0.0):
             raise InputError("wall_exchange [m2] must be symmetric; give the mean of both ways.")
         between[:-1, :-1] = 0.5 * (w + w.T)
-    local = ~takes_part
+    local = np.logical_not(takes_part)
     returned = outside[:, local].sum(axis=1)
     outside = np.where(local, 0.0, outside)
     between[local] = 0.0

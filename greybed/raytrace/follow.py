@@ -105,7 +105,7 @@ def follow_rays(
         np.ascontiguousarray(emissivity.T), specular,
         np.ascontiguousarray(wall_emissivity.T), wall_specular,
     )  # fmt: skip
-    normals = _paths.normal_tables(packing.walls, (wall_emissivity < 1.0).any(axis=0))
+    normals = _paths.normal_tables(packing.walls, wall_emissivity.min(axis=0) < 1.0)
     tasks = [
         (int(i), first, min(first + RAYS_PER_TASK, rays))
         for i in who
