@@ -79,7 +79,8 @@ def radiative_network(
     factors : object
         Exchange factors of one emissivity (an object with ``emission_areas``, such as
         ``greybed.raytrace.ExchangeRows``), or view factors (anything with ``factors``,
-        ``wall_factors``, ``escaped`` and ``areas``). Balanced here.
+        ``wall_factors``, ``escaped`` and ``areas``). Exchange factors at emissivity 1 are view
+        factors where ``emissivity`` is given. Balanced here.
     temperatures : array_like, shape () or (n,), optional
         Of the spheres, above zero [K]; NaN where the heat is given.
     heats : array_like, shape () or (n,), optional
@@ -121,7 +122,7 @@ def radiative_network(
     diffuse-grey surfaces; Mahan, Radiation Heat Transfer (2002), distribution factors; Gebhart,
     Int. J. Heat Mass Transfer 3 (1961) 341.
     """
-    rows, direct = _thermal_rows(factors)
+    rows, direct = _thermal_rows(factors, emissivity is not None)
     n, n_walls = rows.wall_factors.shape
     if direct and (emissivity is not None or np.any(np.asarray(wall_emissivity) != 1.0)):
         raise InputError(
@@ -187,7 +188,7 @@ def pairwise_network(
     SolverError
         If the linear solve fails.
     """
-    rows, direct = _thermal_rows(factors)
+    rows, direct = _thermal_rows(factors, True)
     if direct:
         raise InputError("the pairwise formula takes view factors; trace with emissivity 1.")
     n, n_walls = rows.wall_factors.shape
@@ -215,14 +216,12 @@ def pairwise_network(
     return _solve(s, areas, ones, known, given, given_walls, n, imbalance)
 
 
-def _thermal_rows(factors: Any) -> tuple[Rows, bool]:
+def _thermal_rows(factors: Any, as_view_factors: bool) -> tuple[Rows, bool]:
     """Rows whose areas weigh black emission, and whether reflections are inside them."""
-    areas = getattr(factors, "emission_areas", None)
-    direct = areas is not None
-    areas = areas if direct else getattr(factors, "areas", None)
-    if areas is None:
-        raise InputError("factors have no areas; give a traced result or Rows.")
-    return Rows(factors.factors, factors.wall_factors, factors.escaped, areas), direct
+    rows = Rows.taken(factors)
+    # Black spheres absorb what they meet first: their exchange factors are either.
+    either = getattr(factors, "emission_areas", None) is not None and not as_view_factors
+    return rows, rows.emissivity is not None or either
 
 
 def _conditions(

@@ -8,7 +8,11 @@ from greybed.raytrace.exchange_results import (
     RayShares,
 )
 from greybed.raytrace.firsthits import first_hits
-from greybed.raytrace.macroscopic import RadiativeExchangeFactor, radiative_exchange_factor
+from greybed.raytrace.macroscopic import (
+    RadiativeExchangeFactor,
+    breitbach_barthels,
+    radiative_exchange_factor,
+)
 from greybed.raytrace.viewfactors import ViewFactors, standard_error, view_factors
 
 __all__ = [
@@ -18,6 +22,7 @@ __all__ = [
     "RadiativeExchangeFactor",
     "RayShares",
     "ViewFactors",
+    "breitbach_barthels",
     "exchange_factors",
     "exchange_of_rays",
     "first_hits",
