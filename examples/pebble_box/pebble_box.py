@@ -13,7 +13,7 @@ from greybed.coupling import pairwise_network, radiative_network
 from greybed.datasets.containers import Box
 from greybed.datasets.generate import random_packing
 from greybed.datasets.sizes import Mono
-from greybed.raytrace import exchange_factors, exchange_of_rays
+from greybed.raytrace import exchange_factors, exchange_of_rays, radiative_exchange_factor
 
 SIGMA = 5.670374419e-8  # [W/m2/K4]
 SPHERES, DIAMETER, EDGE = 332, 0.06, 0.42  # [-], [m], [m]
@@ -80,6 +80,13 @@ def solve(factors, between, **conditions):
     }
 
 
+def endless(solid, rays, seed):
+    """Radiative exchange factor of a random bed without walls at the same solid fraction."""
+    bed = random_packing(400, solid, Mono(0.5 * DIAMETER), seed=seed)
+    (factors,) = exchange_factors(bed, EMISSIVITY, rays=rays, seed=seed)
+    return radiative_exchange_factor(bed, factors)
+
+
 def reduced(temperatures):
     """(T^4 - T_cold^4) / (T_hot^4 - T_cold^4) [-]."""
     return (temperatures**4 - COLD**4) / (HOT**4 - COLD**4)
@@ -103,8 +110,7 @@ def run(rays, seed=1, packing_seed=1):
     factors, between, closure = traced(bed, rays, seed)
     other, other_between, _ = traced(bed, rays, seed + 1000)
     at_rest = solve(factors, between)
-    # The second question takes the sides' place out of the first: heat of spheres at one
-    # temperature, which in equilibrium drops out.
+    # In equilibrium no sphere gives off heat; all of them hot, they lose it to the cold wall.
     loss = solve(factors, between, temperatures=HOT)
     again = radiative_network(other[0], wall_exchange=other_between[0], wall_temperatures=GIVEN)
     again_loss = radiative_network(
@@ -112,7 +118,6 @@ def run(rays, seed=1, packing_seed=1):
     )
     runs = {name: (at_rest[name], loss[name]) for name in at_rest}
     runs["D, other rays"] = again, again_loss
-    # D as traced, not balanced, for the exchange of single pairs; view factors the same way.
     reference = at_rest["D"]
     full = EDGE**2 * SIGMA * (HOT**4 - COLD**4)
     table = []
@@ -129,9 +134,15 @@ def run(rays, seed=1, packing_seed=1):
                 "heat lost error [%]": 100.0 * (cold.heats.sum() / loss["D"].heats.sum() - 1.0),
             }
         )
-    depth = 1.5 * solid / DIAMETER * EDGE
+    scattered = 1.5 * solid / DIAMETER * EDGE  # each sphere casts its own shadow
+    whole = endless(solid, max(rays // 10, 100), seed)
+    # A slab whose 16 sigma T^3 / (3 extinction) is the conductivity of the bed.
+    depths = {
+        "scattered spheres": scattered,
+        "measured bed": 4.0 * EDGE / (3.0 * whole.factor * DIAMETER),
+    }
     layer = np.minimum((bed.centres[:, 0] / EDGE * LAYERS).astype(int), LAYERS - 1)
-    flux, _ = heaslet_warming(depth, 0.0)
+    slabs = {name: heaslet_warming(depth, 0.0)[0] for name, depth in depths.items()}
     profile = []
     for k in range(LAYERS):
         here = layer == k
@@ -139,7 +150,8 @@ def run(rays, seed=1, packing_seed=1):
         row = {"position [-]": place, "spheres": int(here.sum())}
         for name, (rest, _) in runs.items():
             row[f"{name} [-]"] = reduced(rest.temperatures[here]).mean()
-        row["Heaslet-Warming [-]"] = heaslet_warming(depth, place)[1]
+        for name, depth in depths.items():
+            row[f"slab, {name} [-]"] = heaslet_warming(depth, place)[1]
         profile.append(row)
     summary = {
         "spheres": SPHERES,
@@ -149,16 +161,15 @@ def run(rays, seed=1, packing_seed=1):
         "emissivity": EMISSIVITY,
         "rays_per_sphere": rays,
         "seed": seed,
-        "optical_depth_of_scattered_spheres": depth,
-        "heaslet_warming_flux": flux,
+        "radiative_exchange_factor": {"value": whole.factor, "stderr": whole.stderr},
+        "optical_depth": depths,
+        "heaslet_warming_flux": slabs,
         "flux": {row["model"]: row["flux [-]"] for row in table},
-        "rms_distance_of_layers_from_heaslet_warming": {
+        "rms_distance_of_layers_of_D_from_slab": {
             name: float(
-                np.sqrt(
-                    np.mean([(r[f"{name} [-]"] - r["Heaslet-Warming [-]"]) ** 2 for r in profile])
-                )
+                np.sqrt(np.mean([(r["D [-]"] - r[f"slab, {name} [-]"]) ** 2 for r in profile]))
             )
-            for name in runs
+            for name in depths
         },
         "largest_violation_of_wall_reciprocity": closure,
         "imbalance_before_balancing": reference.imbalance,
@@ -179,8 +190,9 @@ def draw(path, summary, profile, points):
     place, spheres = points
     axes.plot(place, spheres["D"], ".", color="0.75", label="single spheres, D")
     x = np.linspace(0.0, 1.0, 50)
-    depth = summary["optical_depth_of_scattered_spheres"]
-    axes.plot(x, heaslet_warming(depth, x)[1], "k-", label=f"Heaslet-Warming, depth {depth:.2f}")
+    for (name, depth), style in zip(summary["optical_depth"].items(), ("k--", "k-"), strict=True):
+        label = f"Heaslet-Warming, {name}: depth {depth:.2f}"
+        axes.plot(x, heaslet_warming(depth, x)[1], style, label=label, linewidth=1.0)
     at = [row["position [-]"] for row in profile]
     for name, mark in (("D", "o-"), ("Gebhart F", "s--"), ("pairwise F", "^:")):
         axes.plot(at, [row[f"{name} [-]"] for row in profile], mark, label=name)

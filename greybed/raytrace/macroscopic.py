@@ -91,7 +91,10 @@ def radiative_exchange_factor(packing: Packing, result: ExchangeRows) -> Radiati
     In a cubic lattice the linear profile is exact. In a random bed the spheres settle a little
     off it until none gains or loses heat, which lowers k: there the value is an upper bound.
     The spheres conduct well compared with radiation, and the bed is large compared with the way
-    of light. The error covers the rays, not the choice of the bed.
+    of light. The error covers the rays, not the choice of the bed. Where straight channels run
+    through a lattice (simple cubic), some light goes very far: its share falls with the inverse
+    of the distance, squares of the sum have no bound, and the stated error is too small; compare
+    seeds there.
     """
     if not all(packing.periodic):
         raise InputError(

@@ -9,12 +9,13 @@ from greybed.datasets.lattices import lattice
 from greybed.raytrace import (
     _kernels,
     _paths,
+    breitbach_barthels,
     exchange_factors,
     exchange_of_rays,
     first_hits,
+    radiative_exchange_factor,
     view_factors,
 )
-from greybed.raytrace.macroscopic import radiative_exchange_factor
 
 
 def box(low, high):
@@ -145,6 +146,32 @@ def test_macroscopic_factor_of_the_fcc_lattice(fcc):
         assert abs(again / value.factor - 1.0) < 1e-10
 
 
+def test_straight_channels_of_the_simple_cubic_lattice_carry_far():
+    """1.184 is the sum over 17 x 17 x 17 spheres; light in the channels between adds 1.5 %."""
+    bed = lattice("sc", 1, 1.0)
+    (black,) = exchange_factors(bed, 1.0, rays=2_000_000, images=True)
+    pairs = black.pairs
+    share = pairs.factor * (pairs.image**2).sum(axis=1)  # in diameters
+    near = abs(pairs.image).max(axis=1) <= 8
+    within = bed.solid_fraction * share[near].sum()
+    assert abs(within / 1.184 - 1.0) < 0.005
+    value = radiative_exchange_factor(bed, black)
+    assert 1.190 < value.factor < 1.212
+    # The first neighbours as by exact quadrature.
+    first = (pairs.image**2).sum(axis=1) == 1
+    exact = 0.0755868184216
+    assert abs(pairs.factor[first].mean() - exact) < 4.0 * pairs.stderr[first].mean() / 6**0.5
+
+
+def test_correlation_of_pebble_beds():
+    # By hand: psi = 0.39, epsilon = 0.8, B = 2.0546.
+    assert breitbach_barthels(0.39, 0.8) == pytest.approx(0.859488, abs=1e-6)
+    first_term = (1.0 - 0.61**0.5) * 0.39
+    assert breitbach_barthels(0.39, 0.8, 1e-12) == pytest.approx(first_term, rel=1e-9)
+    with pytest.raises(InputError, match="void_fraction"):
+        breitbach_barthels(1.0, 0.8)
+
+
 def test_many_emissivities_are_as_good_as_one(crowd):
     walls = {"wall_emissivity": 0.7, "rays": 20_000}
     together = exchange_factors(crowd, [0.2, 0.6], **walls)[1]
@@ -207,6 +234,26 @@ def test_mirrors_around_a_bed_make_a_lattice():
         off = a.factors[[0]].toarray()[0] - expected
         assert (abs(off) < 4.0 * np.hypot(a.stderr[[0]].toarray()[0], error)).all()
         assert a.escaped[0] == 0.0
+
+
+def test_an_unknown_wall_may_absorb_but_not_reflect():
+    class Sail:
+        pass
+
+    black = _paths.normal_tables([Sail()], np.array([False]))
+    assert np.isnan(black).all()
+    with pytest.raises(InputError, match="wall 0 is a Sail"):
+        _paths.normal_tables([Sail()], np.array([True]))
+
+
+def test_whole_beds_only_have_a_macroscopic_factor(crowd, fcc):
+    with pytest.raises(InputError, match="periodic in all"):
+        radiative_exchange_factor(crowd, fcc[1][0])
+    with pytest.raises(InputError, match="do not belong"):
+        radiative_exchange_factor(lattice("fcc", 1, 1.0), fcc[1][0])
+    value, error = radiative_exchange_factor(fcc[0], fcc[1][4]).conductivity(1000.0)
+    # 4 sigma T^3 d F_E with d = 2 m
+    assert abs(value - 4.0 * 5.670374419e-8 * 1e9 * 2.0 * 0.874) < 4.0 * error + 0.3
 
 
 def test_a_sphere_among_walls_that_absorb_nothing_gets_all_back():
