@@ -198,7 +198,7 @@ def draw(path, summary, profile, points):
         axes.plot(at, [row[f"{name} [-]"] for row in profile], mark, label=name)
     axes.set_xlabel("distance from the hot wall over the edge of the box [-]")
     axes.set_ylabel("(T⁴ − T_cold⁴) / (T_hot⁴ − T_cold⁴) [-]")
-    axes.legend()
+    axes.legend(loc="lower left", fontsize=8)
     figure.savefig(path, dpi=120, metadata={"Software": None})
     plt.close(figure)
 
