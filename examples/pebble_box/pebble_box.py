@@ -214,7 +214,7 @@ def write(path, rows):
 
 def main():
     arguments = argparse.ArgumentParser(description=__doc__)
-    arguments.add_argument("--rays", type=int, default=20_000, help="per sphere")
+    arguments.add_argument("--rays", type=int, default=50_000, help="per sphere")
     arguments.add_argument("--out", type=Path, default=Path(__file__).parent / "results")
     ask = arguments.parse_args()
     summary, table, profile, points, seconds = run(ask.rays)
