@@ -142,16 +142,15 @@ def coverage(options: argparse.Namespace) -> int:
     rays, replicates = 2000, options.replicates
     reference = view_factors(packing, rays=1000 * rays, seed=2**40)
     truth = np.hstack([reference.factors.toarray(), reference.wall_factors])
-    rules = {
-        "standard_error": standard_error,
-        "binomial": lambda k, n: np.sqrt(k * (n - k) / n) / n,
-    }
-    inside = {name: np.zeros(truth.shape) for name in rules}
+    names = ("stated", "of independent rays")
+    inside = {name: np.zeros(truth.shape) for name in names}
     for seed in range(replicates):
         run = view_factors(packing, rays=rays, seed=seed)
         value = np.hstack([run.factors.toarray(), run.wall_factors])
-        for name, rule in rules.items():
-            inside[name] += np.abs(value - truth) <= 1.959964 * rule(value * rays, rays)
+        stated = np.hstack([run.stderr.toarray(), run.wall_stderr])
+        stated = np.where(stated > 0.0, stated, standard_error(0, rays))
+        for name, error in zip(names, (stated, standard_error(value * rays, rays)), strict=True):
+            inside[name] += np.abs(value - truth) <= 1.959964 * error
     expected = truth * rays
     print(f"{replicates} replicates of {rays} rays; share of 95 % intervals that cover the truth")
     for low, high in ((0.3, 1), (1, 3), (3, 10), (10, 30), (30, 100), (100, 300), (10, 2000)):

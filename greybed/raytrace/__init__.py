@@ -1,5 +1,6 @@
 """Monte-Carlo ray tracing of packings: view and exchange factors, each with its standard error."""
 
+from greybed.raytrace.errors import standard_error
 from greybed.raytrace.exchange import exchange_factors, exchange_of_rays
 from greybed.raytrace.exchange_results import (
     ExchangeFactors,
@@ -13,7 +14,7 @@ from greybed.raytrace.macroscopic import (
     breitbach_barthels,
     radiative_exchange_factor,
 )
-from greybed.raytrace.viewfactors import ViewFactors, standard_error, view_factors
+from greybed.raytrace.viewfactors import ViewFactors, view_factors
 
 __all__ = [
     "ExchangeFactors",

@@ -73,6 +73,22 @@ def wall_hit(ox, oy, oz, dx, dy, dz, walls):
 
 
 @njit(**_OPTIONS)
+def walls_ahead(m, pending, rays, centre, walls, bound, wall):
+    """Nearest wall of ``m`` rays, where it is nearer than their ``bound`` [m], which it lowers.
+
+    ``rays`` (6, n) holds directions and starts relative to ``centre`` [m].
+    """
+    for q in range(m):
+        k = pending[q]
+        t, number = wall_hit(
+            centre[0] + rays[3, k], centre[1] + rays[4, k], centre[2] + rays[5, k],
+            rays[0, k], rays[1, k], rays[2, k], walls,
+        )  # fmt: skip
+        if t <= bound[q]:
+            bound[q], wall[q] = t, number
+
+
+@njit(**_OPTIONS)
 def behind(x, y, z, walls):
     """Whether a point lies behind a wall, that is not on the bed's side of it."""
     planes, cylinders = walls.planes, walls.cylinders

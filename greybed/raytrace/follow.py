@@ -99,7 +99,7 @@ def follow_rays(
     if who[0] < 0 or who[-1] >= n:
         raise InputError(f"emitters must lie in 0 ... {n - 1}; got {who[0]} ... {who[-1]}.")
     begin = time.perf_counter()
-    scene = Scene.of(packing)
+    scene = Scene.of(packing).tables
     origins, directions = (np.empty((0, 3)), np.empty((0, 3))) if free is None else free
     optics = (
         np.ascontiguousarray(emissivity.T), specular,
@@ -118,7 +118,7 @@ def follow_rays(
             used, *found = _table(size, len(emissivity))
             keys, stamp, total, square, slots, moments, extra = found
             used = _paths.follow(
-                *task, seed, packing.centres, packing.radii, scene.exposed, origins, directions,
+                *task, seed, scene.centres, scene.radii, scene.exposed, origins, directions,
                 images, scene.grid, scene.walls, normals, max_distance, *optics,
                 keys, stamp, np.empty_like(total), total, square, slots, moments, extra,
             )  # fmt: skip

@@ -10,6 +10,7 @@ from scipy import sparse
 
 from greybed.core import Packing
 from greybed.raytrace import _kernels, tally
+from greybed.raytrace.errors import sequence_error, standard_error
 
 Array = NDArray[np.float64]
 
@@ -54,18 +55,6 @@ class ViewFactors:
     seconds: float
 
 
-def standard_error(count: ArrayLike, rays: ArrayLike) -> Array:
-    """Standard error of a hit fraction ``count / rays`` [-].
-
-    The binomial error after two more hits and two more misses (Agresti & Coull 1998,
-    doi 10.1080/00031305.1998.10480550). It tends to sqrt(p (1 - p) / N) for large counts and,
-    unlike it, stays honest for small ones: intervals of 1.96 errors hold the truth in 95 % of
-    the cases from three expected hits up, and no hit does not claim certainty.
-    """
-    k, n = np.asarray(count, dtype=np.float64), np.asarray(rays, dtype=np.float64)
-    return np.sqrt((k + 2.0) * (n - k + 2.0) / (n + 4.0)) / (n + 4.0)
-
-
 def view_factors(
     packing: Packing,
     *,
@@ -74,6 +63,7 @@ def view_factors(
     threads: int | None = None,
     emitters: ArrayLike | None = None,
     max_distance: float = np.inf,
+    sampling: str = "sobol",
     show_progress: bool = False,
 ) -> ViewFactors:
     """Trace the view factors of a packing.
@@ -96,6 +86,8 @@ def view_factors(
         Trace only from these spheres; the other rows are empty (walls, escape: NaN).
     max_distance : float
         Rays that meet nothing within it count as escaped [m].
+    sampling : {"sobol", "random"}
+        Scrambled quasi-random rays, or independent ones.
     show_progress : bool
         Draw a progress bar on standard error.
 
@@ -128,8 +120,15 @@ def view_factors(
         threads=threads,
         emitters=emitters,
         max_distance=max_distance,
+        sampling=sampling,
         show_progress=show_progress,
     )
+    if sampling == "sobol":
+        error = sequence_error(
+            counts.emitter, counts.count, counts.squares, counts.rays, counts.replicates
+        )
+    else:
+        error = standard_error(counts.count, counts.rays)
     n = len(packing)
     traced = np.isfinite(counts.buried)
     to_sphere = counts.key >= 0
@@ -138,18 +137,20 @@ def view_factors(
     hits = counts.count[to_sphere]
     shape = (n, n)
     factors = sparse.csr_array((hits / counts.rays, index, start), shape=shape)
-    errors = sparse.csr_array((standard_error(hits, counts.rays), index, start), shape=shape)
+    errors = sparse.csr_array((error[to_sphere], index, start), shape=shape)
     walls = np.where(traced[:, None], 0.0, np.full((n, packing.n_walls), np.nan))
     escaped = np.where(traced, 0.0, np.nan)
     lost = counts.key == _kernels.ESCAPED
     escaped[counts.emitter[lost]] = counts.count[lost] / counts.rays
     at_wall = (counts.key < 0) & ~lost
     walls[counts.emitter[at_wall], -1 - counts.key[at_wall]] = counts.count[at_wall] / counts.rays
+    wall_errors = np.where(traced[:, None], standard_error(0, counts.rays), walls)
+    wall_errors[counts.emitter[at_wall], -1 - counts.key[at_wall]] = error[at_wall]
     return ViewFactors(
         factors=factors,
         stderr=errors,
         wall_factors=walls,
-        wall_stderr=standard_error(walls * counts.rays, counts.rays),
+        wall_stderr=wall_errors,
         escaped=escaped,
         buried=counts.buried,
         areas=packing.areas * (1.0 - counts.buried),
