@@ -121,10 +121,15 @@ class Rows:
         Raises
         ------
         InputError
-            If there are no areas.
+            If there are no areas, or factors of several emissivities at once.
         """
         if isinstance(result, cls):
             return result
+        if not hasattr(result, "factors"):
+            raise InputError(
+                f"{type(result).__name__} has no rows of factors; give one result, e.g. results[0] "
+                "of several emissivities."
+            )
         own = getattr(result, "areas", None)
         emissivity = None
         if getattr(result, "emission_areas", None) is not None and (result.emissivity < 1.0).any():

@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-from numba import njit
 
 from greybed.core import Cylinder, InputError, Packing, Plane
 from greybed.datasets.lattices import lattice
 from greybed.raytrace import (
-    _kernels,
     _paths,
     breitbach_barthels,
     exchange_factors,
@@ -71,25 +69,24 @@ def test_rows_sum_to_one_and_are_reciprocal(crowd):
     assert results[0].wall_factors[:, 2].max() == 0.0  # it absorbs nothing
 
 
-@njit
-def _starts(sphere, rays, seed, centre, radius, origins, directions):
-    stream = _kernels._mix(
-        np.uint64(seed) * _paths._MIX_1 + _kernels._mix(np.uint64(sphere) + _paths._GOLDEN)
-    )
+def _starts(sphere, rays, seed, centre, radius):
+    """Origins and directions of the rays that a trace sends from a sphere."""
+    golden, first, whole = int(_paths._GOLDEN), int(_paths._MIX_1), 2**64
+    turn = int(_paths._mix(np.uint64((sphere + golden) % whole)))
+    stream = int(_paths._mix(np.uint64((seed * first + turn) % whole)))
+    origins, directions = np.empty((rays, 3)), np.empty((rays, 3))
     for ray in range(rays):
-        state = _kernels._mix(stream + np.uint64(ray) * _paths._GOLDEN)
-        dx, dy, dz, px, py, pz, _ = _kernels._emit(state)
-        directions[ray] = dx, dy, dz
-        origins[ray] = centre[0] + radius * px, centre[1] + radius * py, centre[2] + radius * pz
+        state = _paths._mix(np.uint64((stream + ray * golden) % whole))
+        *directions[ray], px, py, pz, _ = _paths._emit(np.uint64(state))
+        origins[ray] = centre + radius * np.array([px, py, pz])
+    return origins, directions
 
 
 def test_black_surfaces_absorb_what_they_meet_first(crowd):
     rays, sphere, seed = 5_000, 3, 7
     (black,) = exchange_factors(crowd, 1.0, rays=rays, seed=seed, emitters=[sphere])
-    origins, directions = np.empty((rays, 3)), np.empty((rays, 3))
-    _starts(
-        sphere, rays, seed, crowd.centres[sphere], crowd.radii[sphere], origins, directions
-    )  # the same rays, one flight each
+    # The same rays, one flight each.
+    origins, directions = _starts(sphere, rays, seed, crowd.centres[sphere], crowd.radii[sphere])
     _, hit = first_hits(crowd, origins, directions)
     count = np.bincount(hit[hit >= 0], minlength=12)
     np.testing.assert_array_equal(black.factors[[sphere]].toarray()[0] * rays, count)
