@@ -109,12 +109,18 @@ class RadiationTable:
     source: str = choice(("traced", "closure", "off"))
     rays: int = whole(10_000, at_least=1)  # per sphere, for traced [-]
     seed: int = whole(0, at_least=0)
+    reflections: bool = False  # traced only: exchange factors instead of view factors
     strength: float = quantity("dimensionless", 1.0, above=0.0)  # on the exchange; 1 is physics
     closure: Path | None = None  # relative to the case, for closure
 
     def __post_init__(self) -> None:
         if (self.closure is None) == (self.source == "closure"):
             raise InputError('give closure = "path" with source = "closure", and only there.')
+        if self.reflections and self.source != "traced":
+            raise InputError(
+                f'radiation.reflections = true needs source = "traced", not "{self.source}"; '
+                "remove it or trace."
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,7 +188,9 @@ def load_case(path: str | os.PathLike[str]) -> ThermalCase:
 def view_factors(
     case: ThermalCase, packing: Packing, *, threads: int | None = None, show: bool = False
 ) -> Rows | None:
-    """Rows of view factors from where the case says, or None without radiation.
+    """Rows of view or exchange factors from where the case says, or None without radiation.
+
+    With exchange factors adiabatic walls reflect diffusely, the others are black.
 
     Parameters
     ----------
@@ -212,9 +220,20 @@ def view_factors(
     else:
         from greybed import raytrace
 
-        result = raytrace.view_factors(
-            packing, rays=radiation.rays, seed=radiation.seed, threads=threads, show_progress=show
-        )
+        how: dict[str, Any] = {
+            "rays": radiation.rays,
+            "seed": radiation.seed,
+            "threads": threads,
+            "show_progress": show,
+        }
+        if radiation.reflections:
+            absorbs = [float(w.temperature is not None) for w in case.wall]
+            grey = case.material.emissivity
+            (result,) = raytrace.exchange_factors(
+                packing, grey, wall_emissivity=absorbs if absorbs else 1.0, **how
+            )
+        else:
+            result = raytrace.view_factors(packing, **how)
     rows = Rows.of(result, packing)
     return replace(rows, areas=rows.areas * radiation.strength)
 

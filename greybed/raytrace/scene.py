@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from greybed.core import Cylinder, InputError, Packing, Plane
-from greybed.raytrace import _bundle, _grid, _kernels, _walls
+from greybed.raytrace import _bundle, _grid, _rows, _walls
 
 # Cell edge over mean radius. Measured at solid fractions 0.2 and 0.5, for rays that have left the
 # bundles: a tenth faster than 1.25, and memory falls with the cube.
@@ -24,7 +24,7 @@ class Scene:
     """What the compiled tracer needs of a packing; made by :meth:`of`."""
 
     packing: Packing
-    tables: _kernels.Tables
+    tables: _rows.Tables
 
     @classmethod
     def of(cls, packing: Packing) -> Scene:
@@ -53,7 +53,7 @@ class Scene:
         exposed, clearance = _freedom(packing)
         return cls(
             packing,
-            _kernels.Tables(
+            _rows.Tables(
                 np.ascontiguousarray(packing.centres),
                 np.ascontiguousarray(packing.radii),
                 exposed,

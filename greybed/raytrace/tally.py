@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from greybed.core import InputError, Packing
 from greybed.core.processors import available_threads
 from greybed.core.progress import progress
-from greybed.raytrace import _bundle, _kernels, _sobol
+from greybed.raytrace import _bundle, _kernels, _rows, _sobol
+from greybed.raytrace.arguments import sphere_numbers, whole_number
 from greybed.raytrace.scene import Scene
 
 # One task's rays: small enough to stay in cache, and for one sphere's rays to spread over the
@@ -120,17 +121,17 @@ def trace(
     InputError
         For numbers out of range, walls that do not repeat, or a sphere wholly inside others.
     """
-    rays = _whole(rays, "rays", 1, MOST_RAYS)
-    seed = _whole(seed, "seed", 0)
+    rays = whole_number(rays, "rays", 1, MOST_RAYS)
+    seed = whole_number(seed, "seed", 0)
     workers = available_threads()
     if threads is not None:
-        workers = _whole(threads, "threads", 1, MOST_THREADS)
+        workers = whole_number(threads, "threads", 1, MOST_THREADS)
     if not max_distance > 0.0:
         raise InputError(f"max_distance = {max_distance:g} [m] must be above 0.")
     if sampling not in SAMPLINGS:
         raise InputError(f"sampling = {sampling!r} is unknown; give one of {', '.join(SAMPLINGS)}.")
     n = len(packing)
-    who = np.arange(n) if emitters is None else np.unique(_numbers(emitters))
+    who = np.arange(n) if emitters is None else np.unique(sphere_numbers(emitters))
     if who[0] < 0 or who[-1] >= n:
         raise InputError(f"emitters must lie in 0 ... {n - 1}; got {who[0]} ... {who[-1]}.")
     begin = time.perf_counter()
@@ -231,7 +232,7 @@ class _Job:
         parts = []
         done = 0
         while done < len(tasks):
-            more = _kernels.trace_block(
+            more = _rows.trace_block(
                 tasks[done:], self.offsets, self.seed, self.quasi, self.points, self.images,
                 self.scene.tables, self.limit, most, widest, *output, ends[done:], lost[done:],
             )  # fmt: skip
@@ -247,27 +248,6 @@ class _Job:
             )
         keys, counts, squares = np.concatenate(parts, axis=1)
         return keys, counts, squares, ends, lost
-
-
-def _whole(value: int, name: str, least: int, most: int = 2**63 - 1) -> int:
-    if not least <= value <= most or value != int(value):
-        raise InputError(
-            f"{name} = {value!r} must be a whole number of at least {least} and at most {most}; "
-            "mend it."
-        )
-    return int(value)
-
-
-def _numbers(emitters: ArrayLike) -> NDArray[np.int64]:
-    given = np.asarray(emitters)
-    if given.size == 0:
-        raise InputError("emitters is empty; leave it out to trace from all spheres.")
-    if given.dtype.kind not in "iu":  # a mask would silently mean the spheres 0 and 1
-        raise InputError(
-            f"emitters of type {given.dtype} must be sphere numbers; for a mask give "
-            "np.flatnonzero(mask)."
-        )
-    return given.astype(np.int64)
 
 
 def _merge(
