@@ -64,14 +64,11 @@ class Polygon:
                 f"{what}: its corners stand up to {off:g} [m] off a plane, more than {PLANAR:g} of "
                 "its size; split it into triangles or give a mesh."
             )
-        object.__setattr__(self, "_triangles", _cut(points, np.array(self.normal), what))
+        object.__setattr__(self, "_triangles", cut(points, np.array(self.normal), what))
 
     @property
     def _double_area(self) -> Array:
-        """Newell's vector: along the normal, of twice the area [m2]."""
-        points = np.array(self.vertices)
-        points = points - points[0]
-        return np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
+        return newell(np.array(self.vertices))
 
     @property
     def normal(self) -> Vector:
@@ -91,8 +88,34 @@ class Polygon:
         return np.array(self.vertices)[getattr(self, "_triangles")]  # noqa: B009
 
 
-def _cut(points: Array, normal: Array, what: str) -> NDArray[np.int64]:
-    """Triangles of a flat polygon by cutting off ears; numbers of corners, shape (m, 3)."""
+def newell(points: Array) -> Array:
+    """Vector along the right-hand normal of a polygon (k, 3), of twice its area [m2]."""
+    points = points - points[0]
+    return np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
+
+
+def cut(points: Array, normal: Array, what: str) -> NDArray[np.int64]:
+    """Triangles of a polygon, as seen along its normal, by cutting off ears.
+
+    Parameters
+    ----------
+    points : array, shape (k, 3)
+        Corners in order [m].
+    normal : array, shape (3,)
+        Right-hand unit normal [-].
+    what : str
+        Its name in messages.
+
+    Returns
+    -------
+    triangles : array of int, shape (m, 3)
+        Numbers of corners; fewer than k - 2 where corners lie on straight edges.
+
+    Raises
+    ------
+    InputError
+        If edges cross or touch.
+    """
     first = np.eye(3)[int(np.abs(normal).argmin())]
     u = np.cross(normal, first)
     u /= np.linalg.norm(u)
