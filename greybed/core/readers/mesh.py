@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -82,6 +83,13 @@ def read_mesh(
         )
     except InputError as error:
         raise InputError(f"{place}: {error}") from None
+
+
+def joined(meshes: Sequence[Mesh], name: str) -> Mesh:
+    """One mesh of several, a patch of its own."""
+    first = np.cumsum([0, *(len(m.vertices) for m in meshes)])
+    faces = [m.faces + at for m, at in zip(meshes, first[:-1], strict=True)]
+    return Mesh(np.concatenate([m.vertices for m in meshes]), np.concatenate(faces), name)
 
 
 def _load(place: Path, kind: str) -> dict[str, tuple[Any, Any]]:
