@@ -33,7 +33,8 @@ def run(options: argparse.Namespace) -> int:
     # Loaded here so that --help answers at once.
     from greybed.core.readers import read_packing
     from greybed.core.writers import write_packing
-    from greybed.coupling.case import MeshTable, load_case, run_case, summary, view_factors
+    from greybed.coupling.case import load_case, run_case, summary, view_factors
+    from greybed.coupling.case_walls import MeshTable
 
     if options.threads is not None and options.threads < 1:
         raise InputError(

@@ -50,20 +50,20 @@ material = {conductivity = 15.0, density = 7900.0, heat_capacity = 500.0}
 name = "floor"
 kind = "disc"
 normal = [0, 0, 2]
-radius = "9 mm"
+radius = 9e-3
 temperature = 500
 [[wall]]
 name = "hopper"
 kind = "cone"
-radius = "9 mm"
+radius = 9e-3
 end_radius = "20 mm"
-length = "9 mm"
+length = 9e-3
 temperature = 500
 [[wall]]
 name = "tube"
 kind = "cylinder"
 radius = "20 mm"
-length = "9 mm"
+length = 9e-3
 heat = "adiabatic"
 """
 
