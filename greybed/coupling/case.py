@@ -11,61 +11,25 @@ from typing import Any
 
 import numpy as np
 
-from greybed.core.config import choice, quantity, read_case, tables, vector, whole
+from greybed.core.config import choice, quantity, read_case, tables, whole
 from greybed.core.errors import InputError
 from greybed.core.packing import Packing
-from greybed.core.walls import Cylinder, Plane, Wall
+from greybed.core.walls import Wall
+from greybed.coupling.case_walls import (
+    HEAT,
+    ConeTable,
+    CylinderTable,
+    DiscTable,
+    MeshTable,
+    PlaneTable,
+    check_heat,
+)
 from greybed.coupling.results import ThermalResult
 from greybed.coupling.rows import Rows
 from greybed.coupling.thermal import Material, ThermalBed
 
-
-def _check_heat(place: str, temperature: float | None, heat: str) -> None:
-    if (temperature is None) != (heat == "adiabatic"):
-        said = "has no temperature" if temperature is None else "has a temperature and is adiabatic"
-        raise InputError(f'{place} {said}; give either temperature = ... or heat = "adiabatic".')
-
-
-HEAT = ("fixed", "adiabatic")
 MOST_REPEATS = 60  # of a solve whose conductivity depends on temperature
 SETTLED = 1e-8  # change of the temperatures at which it is done [K]
-
-
-@dataclass(frozen=True, kw_only=True)
-class PlaneTable:
-    """``[[wall]]`` with ``kind = "plane"``."""
-
-    name: str
-    point: tuple[float, float, float] = vector("length", (0.0, 0.0, 0.0))  # [m]
-    normal: tuple[float, float, float] = vector("dimensionless")  # into the bed, any length [-]
-    temperature: float | None = quantity("temperature", None, above=0.0)  # [K]
-    heat: str = choice(HEAT, "fixed")
-
-    def __post_init__(self) -> None:
-        _check_heat(f"wall {self.name!r}", self.temperature, self.heat)
-
-    def wall(self) -> Wall:
-        """The wall itself."""
-        return Plane(self.point, self.normal, self.name)
-
-
-@dataclass(frozen=True, kw_only=True)
-class CylinderTable:
-    """``[[wall]]`` with ``kind = "cylinder"``; the bed is inside."""
-
-    name: str
-    point: tuple[float, float, float] = vector("length", (0.0, 0.0, 0.0))  # of the axis [m]
-    axis: tuple[float, float, float] = vector("dimensionless", (0.0, 0.0, 1.0))  # any length [-]
-    radius: float = quantity("length", above=0.0)  # [m]
-    temperature: float | None = quantity("temperature", None, above=0.0)  # [K]
-    heat: str = choice(HEAT, "fixed")
-
-    def __post_init__(self) -> None:
-        _check_heat(f"wall {self.name!r}", self.temperature, self.heat)
-
-    def wall(self) -> Wall:
-        """The wall itself."""
-        return Cylinder(self.point, self.axis, self.radius, self.name)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +47,7 @@ class OpeningTable:
     heat: str = choice(HEAT, "fixed")
 
     def __post_init__(self) -> None:
-        _check_heat("the opening", self.temperature, self.heat)
+        check_heat("the opening", self.temperature, self.heat)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,8 +118,16 @@ class ThermalCase:
 
     kind: str = choice(("thermal-bed",))
     packing: PackingTable
-    wall: tuple[PlaneTable | CylinderTable, ...] = tables(
-        "kind", {"plane": PlaneTable, "cylinder": CylinderTable}, ()
+    wall: tuple[PlaneTable | CylinderTable | ConeTable | DiscTable | MeshTable, ...] = tables(
+        "kind",
+        {
+            "plane": PlaneTable,
+            "cylinder": CylinderTable,
+            "cone": ConeTable,
+            "disc": DiscTable,
+            "mesh": MeshTable,
+        },
+        (),
     )
     opening: OpeningTable | None = None
     material: MaterialTable

@@ -19,7 +19,8 @@ from greybed.core.errors import GreybedError, InputError
 from greybed.core.files import atomic_path
 from greybed.core.packing import Packing
 from greybed.core.readers.opening import listed, mapped, shown
-from greybed.core.walls import Plane
+from greybed.core.records import record
+from greybed.core.walls import Cylinder, Plane, Wall
 from greybed.raytrace import ViewFactors
 
 FORMAT = "greybed-view-factors"
@@ -67,17 +68,23 @@ class StoredFactors:
 
 def packing_hash(packing: Packing) -> str:
     """SHA-256 of everything that view factors depend on, not of names or files."""
-    walls = [
-        ("plane", *w.point, *w.normal)
-        if isinstance(w, Plane)
-        else ("cylinder", *w.point, *w.axis, float(w.radius))
-        for w in packing.walls
-    ]
+    walls = [_shape(w) for w in packing.walls]
     box = None if packing.box is None else packing.box.tolist()
     digest = hashlib.sha256(json.dumps([len(packing), box, packing.periodic, walls]).encode())
     for array in (packing.centres, packing.radii):
         digest.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
     return digest.hexdigest()
+
+
+def _shape(wall: Wall) -> object:
+    """What a wall is to rays, whatever its name."""
+    # These two as they have always been written, so that older files keep their packing.
+    if isinstance(wall, Plane):
+        return ("plane", *wall.point, *wall.normal)
+    if isinstance(wall, Cylinder) and wall.length is None:
+        return ("cylinder", *wall.point, *wall.axis, float(wall.radius))
+    said = ("name", "dropped", "watertight", "winding_consistent")
+    return {part: value for part, value in record(wall).items() if part not in said}
 
 
 def write_factors(

@@ -26,7 +26,7 @@ from greybed.raytrace._kernels import (
 )
 from greybed.raytrace._sobol import sphere_rays
 from greybed.raytrace._streams import GOLDEN, MIX_1, MIX_2, S32, emit, mix
-from greybed.raytrace._walls import Walls, walls_ahead
+from greybed.raytrace._walls import Walls, crosses, walls_ahead
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
@@ -106,7 +106,9 @@ def _hidden_start(sphere, px, py, pz, radius, scene):
     x, _ = wrapped(centre[0] + radius * px, low[0], edge[0], periodic[0])
     y, _ = wrapped(centre[1] + radius * py, low[1], edge[1], periodic[1])
     z, _ = wrapped(centre[2] + radius * pz, low[2], edge[2], periodic[2])
-    return buried(x, y, z, frame, scene.grid.start, scene.grid.items, scene.walls)
+    if buried(x, y, z, frame, scene.grid.start, scene.grid.items, scene.walls):
+        return True
+    return crosses(centre[0], centre[1], centre[2], x, y, z, scene.walls)
 
 
 class Tables(NamedTuple):

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from greybed.core import Cylinder, InputError, Packing, Plane
+from greybed.core import Cylinder, InputError, Packing, Plane, Wall
+from greybed.core.patches import bounded
 from greybed.raytrace import _bundle, _grid, _rows, _walls
 
 # Cell edge over mean radius. Measured at solid fractions 0.2 and 0.5, for rays that have left the
@@ -33,7 +34,7 @@ class Scene:
         Raises
         ------
         InputError
-            If a wall is not invariant under the packing's periodic shifts.
+            If a wall is not invariant under the packing's periodic shifts; no bounded wall is.
         """
         for wall in packing.walls:
             _check_periodic(wall, packing.periodic)
@@ -67,17 +68,23 @@ class Scene:
     @property
     def walls_between(self) -> bool:
         """Whether a wall may stand between two spheres; one that bounds the bed cannot."""
-        return not all(isinstance(w, Plane | Cylinder) for w in self.packing.walls)
+        return any(bounded(wall) for wall in self.packing.walls)
 
 
-def _check_periodic(wall: Plane | Cylinder, periodic: tuple[bool, bool, bool]) -> None:
+def _check_periodic(wall: Wall, periodic: tuple[bool, bool, bool]) -> None:
+    if any(periodic) and bounded(wall):
+        raise InputError(
+            f"wall {wall.name!r} ends and so does not repeat along the periodic direction "
+            f"{'xyz'[periodic.index(True)]}; make all directions open, or take an unbounded plane "
+            "or cylinder."
+        )
     for axis in range(3):
         if not periodic[axis]:
             continue
         fits = (
             wall.normal[axis] == 0.0
             if isinstance(wall, Plane)
-            else abs(abs(wall.axis[axis]) - 1.0) < 1e-12
+            else isinstance(wall, Cylinder) and abs(abs(wall.axis[axis]) - 1.0) < 1e-12
         )
         if not fits:
             raise InputError(
@@ -100,15 +107,6 @@ def _freedom(packing: Packing) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
             f"{packing.source}: spheres {i} and {j} are the same sphere twice (centre, radius "
             f"{sizes[twins][0, 0]:g} [m]); remove one of them."
         )
-    clearance = np.full(len(packing), np.inf)
-    for wall in packing.walls:
-        offset = packing.centres - np.array(wall.point)
-        if isinstance(wall, Plane):
-            room = offset @ np.array(wall.normal)
-        else:
-            axis = np.array(wall.axis)
-            across = offset - np.outer(offset @ axis, axis)
-            room = wall.radius - np.sqrt((across**2).sum(axis=1))
-        clearance = np.minimum(clearance, room)
+    clearance = _walls.clearance(packing.walls, packing.centres)
     exposed &= clearance >= packing.radii
     return exposed, clearance

@@ -12,7 +12,8 @@ from scipy import sparse
 from greybed.closures.viewfactor import _kernels
 from greybed.closures.viewfactor.markers import RIM, golden_steps, pair_markers
 from greybed.closures.viewfactor.neighbourhood import Neighbourhood, neighbourhood
-from greybed.core import Packing, Plane, RangeError, Wall
+from greybed.core import Cylinder, Packing, Plane, RangeError, Wall
+from greybed.core.patches import bounded, ray_distances
 
 if TYPE_CHECKING:
     from greybed.closures.viewfactor.closure import ViewFactorClosure
@@ -183,6 +184,10 @@ def boundary_shares(
     hit = np.full((n, N_LINES), packing.n_walls)
     for w, wall in enumerate(packing.walls):
         t = _distance(origin, directions, wall)
+        if bounded(wall):
+            # As behind a plane: what starts beyond the wall has met it.
+            middle = np.broadcast_to(packing.centres[:, None, :], offsets.shape)
+            t[_distance(middle, offsets / r[:, None, None], wall) < r[:, None]] = 0.0
         nearer = t < length
         length, hit = np.where(nearer, t, length), np.where(nearer, w, hit)
     through = np.empty((n, N_LINES))
@@ -233,6 +238,9 @@ def _distance(origin: Array, d: Array, wall: Wall) -> Array:
             towards = d @ normal
             t = np.maximum(-((origin - np.array(wall.point)) @ normal) / towards, 0.0)
             return np.where(towards < 0.0, t, np.inf)
+        if not isinstance(wall, Cylinder) or bounded(wall):
+            flat = ray_distances(wall, origin.reshape(-1, 3), d.reshape(-1, 3))
+            return flat.reshape(d.shape[:-1])
         axis = np.array(wall.axis)
         offset = origin - np.array(wall.point)
         u = d - (d @ axis)[..., None] * axis
