@@ -158,6 +158,7 @@ def _rows(result: ViewFactors, first: int, last: int) -> dict[str, NDArray[Any]]
         "walls": result.wall_factors[rows],
         "wall_stderr": result.wall_stderr[rows],
         "escaped": result.escaped[rows],
+        "escaped_stderr": result.escaped_stderr[rows],
         "buried": result.buried[rows],
         "areas": result.areas[rows],
         "seconds": np.array([result.seconds]),
@@ -179,11 +180,13 @@ def _joined(parts: list[dict[str, NDArray[Any]]], rays: int, seed: int) -> ViewF
         wall_factors=whole["walls"],
         wall_stderr=whole["wall_stderr"],
         escaped=whole["escaped"],
+        escaped_stderr=whole["escaped_stderr"],
         buried=whole["buried"],
         areas=whole["areas"],
         rays=rays,
         seed=seed,
         seconds=float(whole["seconds"].sum()),
+        cost=np.full(n, rays),
     )
 
 

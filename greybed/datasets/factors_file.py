@@ -1,4 +1,4 @@
-"""View factors in HDF5, version 1: sparse rows with errors, walls, hash of the packing."""
+"""View factors in HDF5, version 2: sparse rows with errors, walls, hash of the packing."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from greybed.core.walls import Plane
 from greybed.raytrace import ViewFactors
 
 FORMAT = "greybed-view-factors"
-VERSION = 1
+VERSION = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,6 +124,8 @@ def write_factors(
         "walls/factors": (result.wall_factors, "-"),
         "walls/stderr": (result.wall_stderr, "-"),
         "escaped": (result.escaped, "-"),
+        "escaped_stderr": (result.escaped_stderr, "-"),
+        "cost": (result.cost.astype(np.int64), "-"),
         "buried": (result.buried, "-"),
         "areas": (result.areas, "m2"),
         "sums/spheres": (np.bincount(row, result.factors.data, n), "-"),
@@ -138,6 +140,7 @@ def write_factors(
         root.attrs["packing"] = np.bytes_(packing_hash(packing))
         root.attrs["rays"] = result.rays
         root.attrs["seed"] = result.seed
+        root.attrs["reciprocal"] = result.reciprocal
         root.attrs["max_distance"] = max_distance
         root.attrs["wall_names"] = np.bytes_(names)
         for name, (values, unit) in arrays.items():
@@ -232,11 +235,14 @@ def _read(place: Path, root: Any) -> StoredFactors:
         wall_factors=_array(place, root, "walls/factors", (n, len(names)), "f"),
         wall_stderr=_array(place, root, "walls/stderr", (n, len(names)), "f"),
         escaped=_array(place, root, "escaped", (n,), "f"),
+        escaped_stderr=_array(place, root, "escaped_stderr", (n,), "f"),
         buried=_array(place, root, "buried", (n,), "f"),
         areas=_array(place, root, "areas", (n,), "f"),
         rays=int(root.attrs["rays"]),
         seed=int(root.attrs["seed"]),
         seconds=math.nan,
+        cost=_array(place, root, "cost", (n,), "i"),
+        reciprocal=bool(root.attrs["reciprocal"]),
     )
     return StoredFactors(
         result,

@@ -14,12 +14,15 @@ from greybed.raytrace.macroscopic import (
     breitbach_barthels,
     radiative_exchange_factor,
 )
+from greybed.raytrace.pairs import PairFactors, pair_factors
+from greybed.raytrace.smoothing import smoothed
 from greybed.raytrace.viewfactors import ViewFactors, view_factors
 
 __all__ = [
     "ExchangeFactors",
     "ExchangeRows",
     "ImagePairs",
+    "PairFactors",
     "RadiativeExchangeFactor",
     "RayShares",
     "ViewFactors",
@@ -27,7 +30,9 @@ __all__ = [
     "exchange_factors",
     "exchange_of_rays",
     "first_hits",
+    "pair_factors",
     "radiative_exchange_factor",
+    "smoothed",
     "standard_error",
     "view_factors",
 ]

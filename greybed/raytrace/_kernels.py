@@ -17,6 +17,7 @@ from greybed.raytrace._bundle import (
 )
 from greybed.raytrace._grid import Grid
 from greybed.raytrace._sobol import sphere_rays
+from greybed.raytrace._streams import GOLDEN, MIX_1, MIX_2, S32, emit, mix
 from greybed.raytrace._walls import Walls, behind, wall_hit, walls_ahead
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
@@ -28,59 +29,6 @@ MAX_ATTEMPTS = 1000
 # Image shifts are coded in ten bits an axis; a ray that goes further counts as escaped.
 IMAGE_LIMIT = 500
 IMAGE_SPAN = 1024
-
-_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
-_MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
-_MIX_2 = np.uint64(0x94D049BB133111EB)
-_S30, _S27, _S31, _S32 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(32)
-_LOW = np.uint64(0xFFFFFFFF)
-_TO_UNIT = 2.0**-31
-
-
-@njit(**_OPTIONS)
-def _mix(z):
-    """Finaliser of SplitMix64 (Steele, Lea & Flood 2014, doi 10.1145/2660193.2660195)."""
-    z = (z ^ (z >> _S30)) * _MIX_1
-    z = (z ^ (z >> _S27)) * _MIX_2
-    return z ^ (z >> _S31)
-
-
-@njit(**_OPTIONS)
-def _in_disc(state):
-    """Uniform point of the unit disc: x, y, x^2 + y^2 and the advanced state."""
-    # Rejection costs 1.27 draws on average, less than a sine and a cosine; one draw gives both
-    # coordinates, on a grid of 2^-31 that no tally can resolve.
-    while True:
-        state += _GOLDEN
-        bits = _mix(state)
-        x = np.float64(np.int32(bits >> _S32)) * _TO_UNIT
-        y = np.float64(np.int32(bits & _LOW)) * _TO_UNIT
-        s = x * x + y * y
-        if s < 1.0:
-            return x, y, s, state
-
-
-@njit(**_OPTIONS)
-def _emit(state):
-    """Ray leaving the unit sphere with a cosine law: direction, surface point, state.
-
-    Seen from far away a Lambertian sphere is a uniformly bright disc whatever the direction.
-    So the direction is isotropic and the point uniform on the disc across it: the same law as
-    a uniform surface point with a cosine-weighted direction, without trigonometry.
-    """
-    x, y, s, state = _in_disc(state)
-    w = 2.0 * math.sqrt(1.0 - s)
-    dx, dy, dz = x * w, y * w, 1.0 - 2.0 * s
-    u, v, s, state = _in_disc(state)
-    # Orthonormal basis without branches: Duff et al. 2017, jcgt.org/published/0006/01/01
-    sign = math.copysign(1.0, dz)
-    a = -1.0 / (sign + dz)
-    b = dx * dy * a
-    lift = math.sqrt(1.0 - s)
-    px = u * (1.0 + sign * dx * dx * a) + v * b + lift * dx
-    py = u * (sign * b) + v * (sign + dy * dy * a) + lift * dy
-    pz = u * (-sign * dx) - v * dy + lift * dz
-    return dx, dy, dz, px, py, pz, state
 
 
 @njit(**_OPTIONS)
@@ -206,7 +154,7 @@ def _wrapped(position, low, edge, periodic):
 @njit(**_OPTIONS)
 def _slot(key, keys, slots, used, mask):
     """Slot of a key in an open-addressing table; ``used`` where it is new."""
-    place = np.int64(_mix(np.uint64(key)) & np.uint64(mask))
+    place = np.int64(mix(np.uint64(key)) & np.uint64(mask))
     while slots[place] >= 0:
         if keys[place] == key:
             return slots[place], place
@@ -234,21 +182,21 @@ def _start_rays(sphere, first, last, offsets, seed, quasi, points, radius, hidde
     scrambled sequence; else ray k draws from a stream of its own. Starts on buried surface are
     drawn again from such a stream; -1 where the whole sphere is buried.
     """
-    stream = _mix(np.uint64(seed) * _MIX_1 + _mix(np.uint64(sphere) + _GOLDEN))
+    stream = mix(np.uint64(seed) * MIX_1 + mix(np.uint64(sphere) + GOLDEN))
     begin = offsets[first]
     n = offsets[last] - begin
     if quasi:
         seeds = np.empty(4, np.uint32)
         for r in range(first, last):
-            state = _mix(stream ^ _mix(np.uint64(r) + _MIX_2))
+            state = mix(stream ^ mix(np.uint64(r) + MIX_2))
             for k in range(4):
-                state += _GOLDEN
-                seeds[k] = np.uint32(_mix(state) >> _S32)
+                state += GOLDEN
+                seeds[k] = np.uint32(mix(state) >> S32)
             sphere_rays(points, offsets[r + 1] - offsets[r], seeds, rays, offsets[r] - begin)
     else:
         for k in range(n):
-            state = _mix(stream + np.uint64(begin + k) * _GOLDEN)
-            dx, dy, dz, px, py, pz, state = _emit(state)
+            state = mix(stream + np.uint64(begin + k) * GOLDEN)
+            dx, dy, dz, px, py, pz, state = emit(state)
             rays[0, k], rays[1, k], rays[2, k] = dx, dy, dz
             rays[3, k], rays[4, k], rays[5, k] = px, py, pz
     if not hidden:
@@ -256,13 +204,13 @@ def _start_rays(sphere, first, last, offsets, seed, quasi, points, radius, hidde
     rejected = 0
     for k in range(n):
         # After the draw of the ray itself, so that redrawn starts are new ones.
-        state = _mix(stream + np.uint64(begin + k) * _GOLDEN) ^ _MIX_2
+        state = mix(stream + np.uint64(begin + k) * GOLDEN) ^ MIX_2
         attempt = 0
         while _hidden_start(sphere, rays[3, k], rays[4, k], rays[5, k], radius, scene):
             attempt += 1
             if attempt == MAX_ATTEMPTS:
                 return -1
-            dx, dy, dz, px, py, pz, state = _emit(state)
+            dx, dy, dz, px, py, pz, state = emit(state)
             rays[0, k], rays[1, k], rays[2, k] = dx, dy, dz
             rays[3, k], rays[4, k], rays[5, k] = px, py, pz
         rejected += attempt
@@ -367,13 +315,13 @@ def trace_sphere(
             code[k] = r - first
     if found >= 0:
         first_neighbours(
-            n, radius, found, around, rays, work.distance, work.index, work.lists,
+            n, radius, found, around, rays, work.distance, work.nearest, work.lists,
             work.best, work.who,
         )  # fmt: skip
     # Names for the arrays: through ``work`` each access would be reference-counted.
     keys, slots, counts = work.keys, work.slots, work.counts
     places, slot_of, part = work.places, work.slot_of, work.code
-    index, reach = work.index, work.distance
+    index, reach = work.nearest, work.distance
     hits, key_of = work.hit, work.key
     mask = keys.size - 1
     used = 0
@@ -447,7 +395,7 @@ class Work(NamedTuple):
     code: np.ndarray  # (rays,) int64
     fields: np.ndarray  # (4097,) int64
     distance: np.ndarray  # (rays,) [m]
-    index: np.ndarray  # (rays,) int64
+    nearest: np.ndarray  # (rays,) int64, neighbour
     pending: np.ndarray  # (rays,) int64, rays that no neighbour has settled
     hit: np.ndarray  # (rays,) int64, their neighbour or -1
     ahead: np.ndarray  # (rays,) how far they have come [m]

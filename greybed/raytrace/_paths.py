@@ -11,18 +11,14 @@ from numba import njit
 from greybed.core.errors import InputError
 from greybed.core.walls import Cylinder, Plane, Wall
 from greybed.raytrace._kernels import (
-    _GOLDEN,
-    _MIX_1,
     ESCAPED,
     IMAGE_LIMIT,
     IMAGE_SPAN,
     MAX_ATTEMPTS,
     _buried,
-    _emit,
-    _in_disc,
-    _mix,
     march,
 )
+from greybed.raytrace._streams import GOLDEN, MIX_1, emit, in_disc, mix
 from greybed.raytrace._walls import wall_hit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
@@ -88,8 +84,8 @@ def _wall_normal(x, y, z, row):
 @njit(**_OPTIONS)
 def _uniform(state):
     """Number in [0, 1) and the advanced state."""
-    state += _GOLDEN
-    return np.float64(_mix(state) >> _S11) * _UNIT, state
+    state += GOLDEN
+    return np.float64(mix(state) >> _S11) * _UNIT, state
 
 
 @njit(**_OPTIONS)
@@ -102,7 +98,7 @@ def _reflect(dx, dy, dz, nx, ny, nz, mirror, state):
             dx, dy, dz = dx - twice * nx, dy - twice * ny, dz - twice * nz
             scale = 1.0 / math.sqrt(dx * dx + dy * dy + dz * dz)
             return dx * scale, dy * scale, dz * scale, state
-    u, v, s, state = _in_disc(state)
+    u, v, s, state = in_disc(state)
     # Orthonormal basis without branches: Duff et al. 2017, jcgt.org/published/0006/01/01
     sign = math.copysign(1.0, nz)
     a = -1.0 / (sign + nz)
@@ -138,7 +134,7 @@ def _gate(o, d, low, edge, enter, leave):
 def _place(key, stamp, keys, used, slots):
     """Slot of a key in an open-addressing table (stamp -1: free), and the slots in use."""
     mask = keys.size - 1
-    slot = np.int64(_mix(np.uint64(key)) & np.uint64(mask))
+    slot = np.int64(mix(np.uint64(key)) & np.uint64(mask))
     while stamp[slot] >= 0:
         if keys[slot] == key:
             return slot, used
@@ -172,9 +168,9 @@ def follow(
     free = origins.shape[0] > 0
     half = IMAGE_SPAN // 2
     used = 0
-    stream = _mix(np.uint64(seed) * _MIX_1 + _mix(np.uint64(emitter) + _GOLDEN))
+    stream = mix(np.uint64(seed) * MIX_1 + mix(np.uint64(emitter) + GOLDEN))
     for ray in range(first_ray, last_ray):
-        state = _mix(stream + np.uint64(ray) * _GOLDEN)
+        state = mix(stream + np.uint64(ray) * GOLDEN)
         if free:
             ox, sx = _into(origins[ray, 0], low[0], edge[0], periodic[0])
             oy, sy = _into(origins[ray, 1], low[1], edge[1], periodic[1])
@@ -183,7 +179,7 @@ def follow(
         else:
             attempt, radius = 0, radii[emitter]
             while True:
-                dx, dy, dz, ox, oy, oz, state = _emit(state)
+                dx, dy, dz, ox, oy, oz, state = emit(state)
                 ox, sx = _into(centres[emitter, 0] + radius * ox, low[0], edge[0], periodic[0])
                 oy, sy = _into(centres[emitter, 1] + radius * oy, low[1], edge[1], periodic[1])
                 oz, sz = _into(centres[emitter, 2] + radius * oz, low[2], edge[2], periodic[2])

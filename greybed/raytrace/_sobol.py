@@ -46,7 +46,7 @@ def direction_numbers() -> np.ndarray:
 
 
 @njit(**_OPTIONS)
-def _scrambled(x, seed):
+def scrambled(x, seed):
     """Point in (0, 1) of a reversed number, nested bits flipped by a hash of ``seed``."""
     # Vegdahl's constants (psychopath.io/post/2021_01_30_building_a_better_lk_hash), which leave
     # less pattern than those of the paper.
@@ -111,10 +111,10 @@ def sphere_rays(points, n, seeds, rays, at):
     r0, r1, r2 = rays[0, at : at + n], rays[1, at : at + n], rays[2, at : at + n]
     r3, r4, r5 = rays[3, at : at + n], rays[4, at : at + n], rays[5, at : at + n]
     for k in range(n):
-        u = _scrambled(p0[k], s0)
-        v = _scrambled(p1[k], s1)
-        w = _scrambled(p2[k], s2)
-        h = _scrambled(p3[k], s3)
+        u = scrambled(p0[k], s0)
+        v = scrambled(p1[k], s1)
+        w = scrambled(p2[k], s2)
+        h = scrambled(p3[k], s3)
         dz = 1.0 - 2.0 * u
         flat = math.sqrt(1.0 - dz * dz)
         cosine, sine = turn(v)

@@ -64,6 +64,11 @@ class Scene:
             ),
         )
 
+    @property
+    def walls_between(self) -> bool:
+        """Whether a wall may stand between two spheres; one that bounds the bed cannot."""
+        return not all(isinstance(w, Plane | Cylinder) for w in self.packing.walls)
+
 
 def _check_periodic(wall: Plane | Cylinder, periodic: tuple[bool, bool, bool]) -> None:
     for axis in range(3):

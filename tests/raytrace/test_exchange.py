@@ -7,6 +7,7 @@ from greybed.core import Cylinder, InputError, Packing, Plane
 from greybed.datasets.lattices import lattice
 from greybed.raytrace import (
     _paths,
+    _streams,
     breitbach_barthels,
     exchange_factors,
     exchange_of_rays,
@@ -71,13 +72,13 @@ def test_rows_sum_to_one_and_are_reciprocal(crowd):
 
 def _starts(sphere, rays, seed, centre, radius):
     """Origins and directions of the rays that a trace sends from a sphere."""
-    golden, first, whole = int(_paths._GOLDEN), int(_paths._MIX_1), 2**64
-    turn = int(_paths._mix(np.uint64((sphere + golden) % whole)))
-    stream = int(_paths._mix(np.uint64((seed * first + turn) % whole)))
+    golden, first, whole = int(_streams.GOLDEN), int(_streams.MIX_1), 2**64
+    turn = int(_streams.mix(np.uint64((sphere + golden) % whole)))
+    stream = int(_streams.mix(np.uint64((seed * first + turn) % whole)))
     origins, directions = np.empty((rays, 3)), np.empty((rays, 3))
     for ray in range(rays):
-        state = _paths._mix(np.uint64((stream + ray * golden) % whole))
-        *directions[ray], px, py, pz, _ = _paths._emit(np.uint64(state))
+        state = _streams.mix(np.uint64((stream + ray * golden) % whole))
+        *directions[ray], px, py, pz, _ = _streams.emit(np.uint64(state))
         origins[ray] = centre + radius * np.array([px, py, pz])
     return origins, directions
 
