@@ -256,8 +256,8 @@ def cone_hit(ox, oy, oz, dx, dy, dz, cone):
     nearest = np.inf
     for t in (one, two):
         along = s + t * p
-        # Behind the apex there is a second, unwanted nappe.
-        if 0.0 < t < nearest and -slack <= along <= length + slack and r + g * t >= 0.0:
+        # The second nappe, beyond the apex, lies beyond the ends as well.
+        if 0.0 < t < nearest and -slack <= along <= length + slack:
             nearest = t
     return nearest
 

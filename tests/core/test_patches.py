@@ -235,6 +235,19 @@ def test_no_ray_slips_through_edges_and_corners():
         d = (aims - o) / np.linalg.norm(aims - o, axis=1, keepdims=True)
         reach = tables.ray_distances(mesh, o, d)
         np.testing.assert_allclose(reach, np.linalg.norm(aims - o, axis=1), rtol=1e-6)
+    # Exactly through corners and edges, where products are exact and areas zero.
+    n = 5
+    grid = np.array([[x, y, 0.0] for x in range(n + 1) for y in range(n + 1)])
+    cell = np.array([k * (n + 1) + m for k in range(n) for m in range(n)])
+    both = [cell, cell + n + 1, cell + n + 2], [cell, cell + n + 2, cell + 1]
+    for order in ((0, 1, 2), (2, 1, 0)):
+        flat = Mesh(grid, np.concatenate([np.stack(f, axis=1)[:, order] for f in both]))
+        x, y = (a.ravel() for a in np.meshgrid(*[np.arange(0, n + 0.25, 0.25)] * 2))
+        for axis in range(3):
+            turned = Mesh(np.roll(flat.vertices, axis, axis=1), flat.faces)
+            o = np.roll(np.stack([x, y, 0 * x + 2], axis=1), axis, axis=1)
+            d = np.roll(np.tile([0.0, 0, -1], (len(x), 1)), axis, axis=1)
+            assert (tables.ray_distances(turned, o, d) == 2.0).all()
     # Along the edges of a box, and from outside.
     box = Mesh(CUBE, FACES)
     o = np.array([[0.5, 0.5, 0.5], [0.5, 0.5, -1.0], [-1.0, -1.0, -1.0], [0.5, 0.0, 0.5]])
