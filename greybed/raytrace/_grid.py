@@ -23,29 +23,39 @@ class Frame(NamedTuple):
     periodic: tuple[bool, bool, bool]
 
 
+class Items(NamedTuple):
+    """What the cells list. Each sphere stands once, so that tables of large beds stay in cache."""
+
+    entry: np.ndarray  # (m,) uint32, entry of each item
+    table: np.ndarray  # (4 entries,) float64: x, y, z [m] as seen from inside the box, radius^2
+
+
 class Grid(NamedTuple):
     """Uniform cells and the spheres that reach into them; see :func:`build`.
 
-    Items ``start[c]`` to ``start[c + 1]`` are the spheres of cell ``c``; each takes four places in
-    ``items``: x, y, z [m] as seen from that cell (shifted by whole boxes across periodic faces)
-    and radius squared [m2]. ``owner`` is the sphere's number, ``image`` the shift in boxes.
+    Items ``start[c]`` to ``start[c + 1]`` are those of cell ``c``. An entry is a sphere, or its
+    image across a periodic face: ``owner`` is its number, ``image`` the shift in boxes.
     """
 
     frame: Frame
     start: np.ndarray  # (cells + 1,) uint32
-    items: np.ndarray  # (4 m,) float64
-    owner: np.ndarray  # (m,) int32
-    image: np.ndarray  # (3 m,) int8
+    items: Items
+    owner: np.ndarray  # (entries,) int32
+    image: np.ndarray  # (3 entries,) int8
 
 
 @njit(**_OPTIONS)
-def _fill(centres, radii, low, edge, cell, shape, periodic, start, items, owner, image, write):
-    """Count (write False) or store (write True) the spheres of every cell; returns the total."""
+def _fill(
+    centres, radii, low, edge, cell, shape, periodic, start, index, table, owner, image, write
+):  # fmt: skip
+    """Count (write False) or store (write True) the spheres of every cell; returns the totals."""
     first = np.empty(3, np.int64)
     last = np.empty(3, np.int64)
-    total = 0
+    seen = np.empty(27, np.int64)
+    items, entries = 0, 0
     for j in range(radii.size):
         r = radii[j]
+        seen[:] = -1
         for k in range(3):
             # A hair wider than the sphere, so that rounding cannot lose a grazing cell.
             reach = r * (1.0 + 1e-9)
@@ -65,26 +75,37 @@ def _fill(centres, radii, low, edge, cell, shape, periodic, start, items, owner,
                     ez = max(max(bz - centres[j, 2], centres[j, 2] - bz - cell[2]), 0.0)
                     if ex * ex + ey * ey + ez * ez > r * r * (1.0 + 1e-8):
                         continue
-                    # Python's floor division, so that -1 belongs to the box before.
+                    # Python's floor division, so that -1 belongs to the box before. A sphere is
+                    # no wider than the box, so it reaches into the next ones at most.
                     wx, wy, wz = ix // shape[0], iy // shape[1], iz // shape[2]
+                    code = (9 * wx + 3 * wy + wz) + 13
+                    entry = seen[code]
+                    if entry < 0:
+                        entry = entries
+                        seen[code] = entry
+                        entries += 1
+                        if write:
+                            table[4 * entry] = centres[j, 0] - wx * edge[0]
+                            table[4 * entry + 1] = centres[j, 1] - wy * edge[1]
+                            table[4 * entry + 2] = centres[j, 2] - wz * edge[2]
+                            table[4 * entry + 3] = r * r
+                            owner[entry] = j
+                            image[3 * entry] = -wx
+                            image[3 * entry + 1] = -wy
+                            image[3 * entry + 2] = -wz
                     c = (
                         ((ix - wx * shape[0]) * shape[1] + iy - wy * shape[1]) * shape[2]
                         + iz
                         - wz * shape[2]
                     )
-                    total += 1
+                    items += 1
                     if not write:
                         start[c + 1] += 1
                         continue
                     m = start[c]
                     start[c] = m + 1
-                    items[m, 0] = centres[j, 0] - wx * edge[0]
-                    items[m, 1] = centres[j, 1] - wy * edge[1]
-                    items[m, 2] = centres[j, 2] - wz * edge[2]
-                    items[m, 3] = r * r
-                    owner[m] = j
-                    image[m, 0], image[m, 1], image[m, 2] = -wx, -wy, -wz
-    return total
+                    index[m] = entry
+    return items, entries
 
 
 def build(
@@ -101,18 +122,17 @@ def build(
     cell = edge / shape
     n_cells = int(shape.prod())
     start = np.zeros(n_cells + 1, np.int64)
-    none4, none1, none3 = np.empty((0, 4)), np.empty(0, np.int32), np.empty((0, 3), np.int8)
     geometry = (centres, radii, low, edge, cell, shape, periodic)
-    total = _fill(*geometry, start, none4, none1, none3, False)
+    none = np.empty(0, np.uint32), np.empty(0), np.empty(0, np.int32), np.empty(0, np.int8)
+    items, entries = _fill(*geometry, start, *none, False)
     np.cumsum(start, out=start)
-    items = np.empty((total, 4))
-    owner = np.empty(total, np.int32)
-    image = np.empty((total, 3), np.int8)
+    index, table = np.empty(items, np.uint32), np.empty(4 * entries)
+    owner, image = np.empty(entries, np.int32), np.empty(3 * entries, np.int8)
     cursor = start.copy()
-    _fill(*geometry, cursor, items, owner, image, True)
+    _fill(*geometry, cursor, index, table, owner, image, True)
     nx, ny, nz = shape.tolist()
     frame = Frame(
         tuple(low.tolist()), tuple(edge.tolist()), tuple(cell.tolist()),
         tuple((1.0 / cell).tolist()), nx, ny, nz, tuple(periodic.tolist()),
     )  # fmt: skip
-    return Grid(frame, start.astype(np.uint32), items.ravel(), owner, image.ravel())
+    return Grid(frame, start.astype(np.uint32), Items(index, table), owner, image)

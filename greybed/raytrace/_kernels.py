@@ -42,12 +42,13 @@ def _walk(direction, position, low, cell, index, count):
 # Inlined: as a call it would pass its many arguments through the stack for every ray.
 @njit(inline="always", **_OPTIONS)
 def march(ox, oy, oz, dx, dy, dz, limit, frame, start, items):
-    """First sphere along a ray, no further than ``limit``: distance, item, boxes crossed.
+    """First sphere along a ray, no further than ``limit``: distance, entry, boxes crossed.
 
     Walks the cells that the ray crosses (Amanatides & Woo 1987) and stops at the first cell
     whose exit lies behind the nearest hit. Across periodic faces the origin moves back by one
-    box while the ray goes on. Item is -1 where the ray meets no sphere.
+    box while the ray goes on. The entry is -1 where the ray meets no sphere.
     """
+    index, table = items
     low, cell, inverse = frame.low, frame.cell, frame.inverse
     nx, ny, nz = frame.nx, frame.ny, frame.nz
     ix = _cell_of(ox, low[0], inverse[0], nx)
@@ -65,17 +66,18 @@ def march(ox, oy, oz, dx, dy, dz, limit, frame, start, items):
         # Unsigned indices: for signed ones every access first tests for a count from the end,
         # which costs a third of the whole trace.
         for m in range(np.uint64(start[np.uint64(c)]), np.uint64(start[np.uint64(c + 1)])):
-            k = np.uint64(4) * np.uint64(m)
-            qx = items[k] - ox
-            qy = items[k + np.uint64(1)] - oy
-            qz = items[k + np.uint64(2)] - oz
+            e = index[np.uint64(m)]
+            k = np.uint64(4) * np.uint64(e)
+            qx = table[k] - ox
+            qy = table[k + np.uint64(1)] - oy
+            qz = table[k + np.uint64(2)] - oz
             b = qx * dx + qy * dy + qz * dz
-            root = b * b - (qx * qx + qy * qy + qz * qz) + items[k + np.uint64(3)]
+            root = b * b - (qx * qx + qy * qy + qz * qz) + table[k + np.uint64(3)]
             # Spheres behind the origin include the emitter itself: it needs no other test.
             if b > 0.0 and root > 0.0:
                 t = b - math.sqrt(root)
                 if t < nearest:
-                    nearest, found = t, np.int64(m)
+                    nearest, found = t, np.int64(e)
                     # The walk may cross into another box before it is sure of this hit.
                     hit_x, hit_y, hit_z = sx, sy, sz
         exit_at = min(next_x, min(next_y, next_z))
@@ -118,10 +120,11 @@ def buried(x, y, z, frame, start, items, walls):
     iy = _cell_of(y, low[1], inverse[1], frame.ny)
     iz = _cell_of(z, low[2], inverse[2], frame.nz)
     c = (ix * frame.ny + iy) * frame.nz + iz
-    for k in range(4 * np.int64(start[c]), 4 * np.int64(start[c + 1]), 4):
-        qx, qy, qz = items[k] - x, items[k + 1] - y, items[k + 2] - z
+    for m in range(np.int64(start[c]), np.int64(start[c + 1])):
+        k = 4 * np.int64(items.entry[m])
+        qx, qy, qz = items.table[k] - x, items.table[k + 1] - y, items.table[k + 2] - z
         # The emitter itself is in the list, at its radius but for rounding.
-        if qx * qx + qy * qy + qz * qz < items[k + 3] * (1.0 - 1e-9):
+        if qx * qx + qy * qy + qz * qz < items.table[k + 3] * (1.0 - 1e-9):
             return True
     return behind(x, y, z, walls)
 

@@ -218,7 +218,7 @@ def follow(
                 k = 4 * item
                 j = owner[item]
                 mx, my, mz = mx + tx, my + ty, mz + tz
-                cx, cy, cz = items[k], items[k + 1], items[k + 2]
+                cx, cy, cz = items.table[k], items.table[k + 1], items.table[k + 2]
                 nx = ex + t * dx - (mx - tx) * edge[0] - cx
                 ny = ey + t * dy - (my - ty) * edge[1] - cy
                 nz = ez + t * dz - (mz - tz) * edge[2] - cz

@@ -65,7 +65,7 @@ def sequence_error(
     own = (np.asarray(squares, dtype=np.float64) - k**2 / replicates) * replicates / dof / rays**2
     many = np.flatnonzero(k >= LEAST_HITS)
     level = np.log2(k[many]).astype(np.int64)
-    _, alike = np.unique(np.asarray(emitter)[many] * 64 + level, return_inverse=True)
+    alike = np.asarray(emitter)[many] * (int(level.max(initial=0)) + 1) + level
     relative = own[many] / binomial[many]
     gain = (PRIOR + dof * np.bincount(alike, relative)) / (PRIOR + dof * np.bincount(alike))
     variance = binomial.copy()

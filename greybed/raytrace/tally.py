@@ -157,7 +157,11 @@ def trace(
             raise
     buried = np.full(n, np.nan)
     buried[who] = rejected[who] / (rejected[who] + rays)
-    merged = _merge(*(np.concatenate(parts) for parts in (emitter, key, count, square)))
+    merged = (
+        np.concatenate(emitter), np.concatenate(key), np.concatenate(count), np.concatenate(square)
+    )  # fmt: skip
+    if not job.whole_rows:
+        merged = _merge(*merged)
     seconds = time.perf_counter() - begin
     return Tally(*merged, rays, job.replicates, buried, seconds)
 
@@ -192,14 +196,22 @@ class _Job:
     def replicates(self) -> int:
         return len(self.offsets) - 1
 
+    @property
+    def whole_rows(self) -> bool:
+        """Whether each task is a whole row, so that tallies are in key order already."""
+        return self.replicates <= self._per_task
+
+    @property
+    def _per_task(self) -> int:
+        return max(1, RAYS_PER_TASK // int(self.offsets[1]))
+
     def rays_of(self, tasks: NDArray[np.int64]) -> int:
         """Rays of some tasks."""
         return int((self.offsets[tasks[:, 2]] - self.offsets[tasks[:, 1]]).sum())
 
     def blocks(self, emitters: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
         """Tasks (sphere, first replicate, last replicate) in blocks worth handing to a thread."""
-        longest = int(self.offsets[1])
-        first = np.arange(0, self.replicates, max(1, RAYS_PER_TASK // longest))
+        first = np.arange(0, self.replicates, self._per_task)
         last = np.append(first[1:], self.replicates)
         rays_per_task = int((self.offsets[last] - self.offsets[first]).max())
         per_block = max(1, RAYS_PER_BLOCK // rays_per_task)
@@ -257,8 +269,6 @@ def _merge(
     squares: NDArray[np.int64],
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
     """Sum the counts, and the squares, of equal (emitter, key), sorted."""
-    if (np.diff(emitter, prepend=-1)[np.diff(key, prepend=key[0]) <= 0] > 0).all():
-        return emitter, key, count, squares  # one task per sphere: tallies are in key order
     order = np.lexsort((key, emitter))
     emitter, key, count, squares = emitter[order], key[order], count[order], squares[order]
     new = np.ones(len(key), dtype=bool)
