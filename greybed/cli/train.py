@@ -21,10 +21,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--model", choices=("mlp", "forest"), default="mlp", help="default: mlp")
     parser.add_argument(
         "--markers",
-        choices=("pencil", "published"),
+        choices=("pencil", "published", "wall"),
         default="pencil",
         help="pencil: real blockers on a pencil of lines; published: r_j/d, spheres between, "
-        "r_j/r_i, solid fraction (default: pencil)",
+        "r_j/r_i, solid fraction; wall: from spheres to walls (default: pencil)",
     )
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="default: 0")
     parser.add_argument("--epochs", type=int, default=40, metavar="N", help="default: 40")
@@ -36,6 +36,7 @@ def run(options: argparse.Namespace) -> int:
     """Train, check the limits, write the artifact."""
     from greybed.closures import content_hash, save
     from greybed.closures.artifact import SUFFIX
+    from greybed.closures.viewfactor import MARKER_SETS
     from greybed.closures.viewfactor.limits import check_limits
     from greybed.core import InputError
     from greybed.core.files import output_folder, writable_file, write_summary
@@ -44,7 +45,8 @@ def run(options: argparse.Namespace) -> int:
 
     if options.epochs < 1:
         raise InputError(f"--epochs = {options.epochs} must be at least 1.")
-    name = f"viewfactor_{options.model}_{options.markers}"
+    quantity = MARKER_SETS[options.markers].quantity
+    name = f"{quantity}_{options.model}_{options.markers}"
     name = name if options.name is None else options.name
     if not name.strip(". ") or Path(name).name != name:
         raise InputError(f"--name = {name!r} is no file name; give one without folders.")

@@ -18,7 +18,7 @@ from greybed.closures.artifact import SUFFIX
 from greybed.closures.viewfactor.bed import inner_fraction
 from greybed.closures.viewfactor.limits import check_limits
 from greybed.core.files import output_folder, write_summary
-from greybed.datasets.viewfactor import ViewFactorData, default_design, generate, read
+from greybed.datasets.viewfactor import ViewFactorData, generate, quick_design, read
 from greybed.export import (
     CompiledClosure,
     OnnxClosure,
@@ -139,7 +139,7 @@ def _read_beds() -> Result:
 
 
 def _dataset(folder: Path, seed: int, small: bool) -> Result:
-    design = default_design(seed)
+    design = quick_design(seed)
     if small:
         few = [replace(p, count=120) for p in design.packing[::3]]
         for split, k in (("calibrate", -2), ("test", -1)):

@@ -50,10 +50,11 @@ def score(
     rows = data.in_split(split)
     c = {name: column[rows] for name, column in data.columns.items()}
     packing = data.packing[rows]
-    p = closure.predict(**{name: c[name] for name in closure.marker_names})
+    m = {name: c[name] for name in closure.marker_names}
+    p = closure.predict(**m)
     predicted, truth, exact = p.view_factor, c["factor"], c["exact"]
     big = truth > LEAST
-    free = c["n_between"] == 0.0
+    free = closure.markers.gate(m) == 0.0
     error = predicted - truth
     sigma = np.hypot(p.stderr, c["stderr"])
     w = c["weight"]

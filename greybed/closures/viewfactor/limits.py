@@ -96,7 +96,7 @@ def check_limits(
     """
     law = closure.evaluate if evaluate is None else evaluate
     markers = random_markers(closure, n, seed)
-    exact = pair_factor(markers["radius_over_distance"], markers["radius_ratio"])
+    exact = closure.markers.exact(markers)
     free = _free(closure, markers)
     factor = law(**markers)
     unobstructed = law(**free)
@@ -107,6 +107,8 @@ def check_limits(
             "F <= F_exact: largest excess", max(_highest(factor / exact - 1.0), 0.0), rounding
         ),
     ]
+    if closure.quantity == "wallfactor":
+        return [*cases, *_wall_cases(law, free, rounding)]
     back = law(**_swapped(markers))
     ratio2 = markers["radius_ratio"] ** 2  # A_j / A_i
     cases.append(
@@ -130,6 +132,15 @@ def check_limits(
             LimitCase("no jump in distance: step ratio when halved", _jump(closure, law, seed), 0.6)
         )
     return cases
+
+
+def _wall_cases(law: Evaluate, free: dict[str, Array], rounding: float) -> list[LimitCase]:
+    plane = law(**{**free, "wall_share": np.full_like(free["wall_share"], 0.5)})
+    everything = law(**{**free, "wall_share": np.ones_like(free["wall_share"])})
+    return [
+        LimitCase("infinite plane, nothing between: 1/2", _largest(2.0 * plane - 1.0), rounding),
+        LimitCase("wall all around, nothing between: 1", _largest(everything - 1.0), rounding),
+    ]
 
 
 def _largest(error: Array) -> float:
