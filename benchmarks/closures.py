@@ -13,7 +13,6 @@ root mean squares are compared, and stated.
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from typing import Any
 
@@ -96,9 +95,7 @@ def _hats(data: ViewFactorData) -> csr_array:
         for b in (0, 1):
             rows.append(np.arange(len(x)))
             columns.append((at[0] + a) * len(SOLID) + at[1] + b)
-            values.append(
-                (share[0] if a else 1.0 - share[0]) * (share[1] if b else 1.0 - share[1])
-            )
+            values.append((share[0] if a else 1.0 - share[0]) * (share[1] if b else 1.0 - share[1]))
     shape = (len(x), len(DISTANCES) * len(SOLID))
     return csr_array(
         (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape
@@ -193,7 +190,8 @@ def main() -> None:
             f"{name:<28} R2 {f['r2']:.5f} | {f['r2_above_1e-4']:.5f}  RMSE {f['rmse']:.2e} | "
             f"{f['rmse_above_1e-4']:.2e}  MAE {f['mae']:.2e} | {f['mae_above_1e-4']:.2e}  MAPE "
             f"{100 * f['mape_above_1e-2']:.1f} % {100 * f['mape_above_1e-3']:.1f} %  "
-            f"below 0: {f['negative']}  noise {f['noise_rms']:.1e} | {f['noise_rms_above_1e-4']:.1e}",
+            f"below 0: {f['negative']}  noise {f['noise_rms']:.1e} | "
+            f"{f['noise_rms_above_1e-4']:.1e}",
             flush=True,
         )
 
@@ -212,8 +210,8 @@ def main() -> None:
              whole.evaluate(**{n: other.columns[n] for n in whole.marker_names}))  # fmt: skip
         wall = train(data, "mlp", "wall", epochs=options.epochs)
     else:
-        closures = {name.replace("_", ", "): shipped(f"viewfactor_{name}") for name in
-                    ("mlp_published", "forest_published", "mlp_pencil", "forest_pencil")}  # fmt: skip
+        names = ("mlp_published", "forest_published", "mlp_pencil", "forest_pencil")
+        closures = {name.replace("_", ", "): shipped(f"viewfactor_{name}") for name in names}
         wall = shipped("wallfactor_mlp_wall")
     for name, closure in closures.items():
         note(name, closure.evaluate(**{n: truth.columns[n] for n in closure.marker_names}))

@@ -3,8 +3,9 @@
 Example:
   greybed train viewfactor runs/viewfactor.h5 --model mlp --out runs
 
-Writes NAME.closure (one file: weights, markers, ranges, golden rows) and summary.json. The
-exit code is 1 if a limiting case fails.
+Writes NAME.closure (one file: weights, markers, ranges, golden rows), NAME.html (errors by regime,
+calibration, learning curve, model card) and summary.json. The exit code is 1 if a limiting case
+fails.
 """
 
 from __future__ import annotations
@@ -28,6 +29,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="default: 0")
     parser.add_argument("--epochs", type=int, default=40, metavar="N", help="default: 40")
+    parser.add_argument(
+        "--no-curve", action="store_true", help="leave out the learning curve, which takes as long "
+        "as the training itself",
+    )  # fmt: skip
     parser.add_argument("--name", help="name of the file (default: viewfactor_MODEL_MARKERS)")
     parser.add_argument("--out", required=True, metavar="DIR", help="folder to write into")
 
@@ -41,7 +46,9 @@ def run(options: argparse.Namespace) -> int:
     from greybed.core import InputError
     from greybed.core.files import output_folder, writable_file, write_summary
     from greybed.datasets.viewfactor import read
-    from greybed.training import train
+    from greybed.report.model import render_model
+    from greybed.training import learning_curve, train
+    from greybed.training.viewfactor import rows_for
 
     if options.epochs < 1:
         raise InputError(f"--epochs = {options.epochs} must be at least 1.")
@@ -62,8 +69,14 @@ def run(options: argparse.Namespace) -> int:
     except InputError as error:
         raise InputError(f"{options.data}: {error}") from None
     seconds = time.perf_counter() - begin
+    if not options.no_curve:
+        closure.card["learning_curve"] = learning_curve(
+            data, options.model, options.markers, seed=options.seed, epochs=options.epochs
+        )
     path = save(closure, target)
     cases = check_limits(closure)
+    rows = rows_for(data, closure.markers)
+    page = render_model(closure, rows, cases, target.with_suffix(".html"), name=name)
     score = closure.card["score"]
     write_summary(
         target.parent,
@@ -71,7 +84,10 @@ def run(options: argparse.Namespace) -> int:
         {
             "file": path.name,
             "hash": content_hash(closure),
+            "report": page.name,
             "score": score,
+            "regimes": closure.card["regimes"],
+            "learning_curve": closure.card.get("learning_curve", []),
             "limits": {case.name: case.passed for case in cases},
             "seconds": seconds,
         },
@@ -83,6 +99,7 @@ def run(options: argparse.Namespace) -> int:
         f"{path}: R2 = {score['r2']:.5f} (95 %: {low:.5f} to {high:.5f}), RMSE = "
         f"{score['rmse']:.2e} over {score['pairs']} pairs of {score['packings']} unseen packings"
     )
+    print(f"report: {page}")
     failed = [case.name for case in cases if not case.passed]
     for name_ in failed:
         print(f"limiting case fails: {name_}")

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from greybed.closures.viewfactor import ViewFactorClosure
 from greybed.datasets.viewfactor import ViewFactorData
+from greybed.training.regimes import own_error
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,8 @@ def score(
     -------
     dict
         ``r2`` (pairs with F > 1e-4) with ``r2_ci95`` over packings, ``r2_noise`` (what a perfect
-        closure would reach), ``rmse``, ``mae``, ``bias``, ``mape_above_1e-2``,
+        closure would reach), ``rmse``, ``rmse_own`` (the trace's ``noise`` taken out), ``mae``,
+        ``bias``, ``mape_above_1e-2``,
         ``mape_above_1e-3``, ``negative``, ``above_exact``, ``unobstructed_error`` (against the
         exact factor), ``coverage95`` (closure's and trace's errors together),
         ``extrapolated``, and counts.
@@ -68,6 +70,8 @@ def score(
             np.average(c["stderr"][big] ** 2, weights=w[big]) / np.cov(truth[big], aweights=w[big])
         ),
         "rmse": float(np.sqrt(np.average(error[big] ** 2, weights=w[big]))),
+        "rmse_own": own_error(error[big], c["stderr"][big], w[big]),
+        "noise": float(np.sqrt(np.average(c["stderr"][big] ** 2, weights=w[big]))),
         "mae": float(np.average(np.abs(error[big]), weights=w[big])),
         "bias": float(np.average(error[big], weights=w[big])),
         "negative": int((predicted < 0.0).sum()),

@@ -14,6 +14,7 @@ from greybed.core import InputError
 from greybed.core.progress import progress
 from greybed.datasets.beds import SPLITS
 from greybed.datasets.viewfactor import MOST_SEED, ViewFactorData
+from greybed.training.regimes import regimes
 from greybed.training.rows import Rows
 from greybed.training.score import score
 
@@ -110,6 +111,7 @@ def train(
             },
             "rows": len(fitted),
             "score": score(closure, data),
+            "regimes": regimes(closure, data),
             "limits": {case.name: case.error for case in check_limits(closure)},
         }
     )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from greybed.closures.viewfactor.exact import pair_factor
 from greybed.closures.viewfactor.markers import pair_markers
 from greybed.closures.viewfactor.neighbourhood import neighbourhood
 from greybed.closures.viewfactor.walls import WallMarkers, wall_markers
@@ -18,10 +19,15 @@ if TYPE_CHECKING:
     from greybed.closures.viewfactor.closure import ViewFactorClosure
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 # Reach of the pair sum where nothing else is asked for, in mean radii: at solid fractions of
 # settled beds the pairs beyond it hold less than one percent of a row.
 REACH = 10.0
+CHORDS = 3.0
+# Beyond it pairs are counted in a mean field, down to this share of light and up to this reach.
+UNSEEN = 5e-3
+FAR_REACH = 40.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +74,8 @@ def bed_factors(
     wall_closure : ViewFactorClosure, optional
         Closure on the markers ``wall``; without it the free share of the lines is taken as it is.
     reach : float, optional
-        Largest distance between the centres of a pair [m]; 10 mean radii by default.
+        Largest distance between the centres of a pair [m]. By default 10 mean radii for the
+        closure, and a mean field, F_exact exp(-gap / mean chord), for pairs further apart.
     solid_fraction : float, optional
         Solid fraction inside the bed [-]; measured by default (see :func:`inner_fraction`).
 
@@ -82,12 +89,12 @@ def bed_factors(
     sphere, blocked by the real neighbours; the opening is what those lines see of it. Rows add up
     to one within the errors; :meth:`ViewFactorClosure.factors` balances them.
     """
-    size = REACH * float(packing.radii.mean()) if reach is None else reach
-    if not (np.isfinite(size) and size > 0.0):
-        raise RangeError(f"reach = {size:g} [m] must be finite and above 0; leave it out for 10 r.")
     phi = inner_fraction(packing) if solid_fraction is None else solid_fraction
     if not 0.0 < phi < 1.0:
         raise RangeError(f"solid_fraction = {phi:g} [-] must lie in (0, 1); check the packing.")
+    size = _near(packing, phi) if reach is None else float(reach)
+    if not (np.isfinite(size) and size > 0.0):
+        raise RangeError(f"reach = {size:g} [m] must be finite and above 0; leave it out for 10 r.")
     hood = neighbourhood(packing, size)
     owner = hood.owner
     if (hood.distance == 0.0).any():
@@ -109,6 +116,10 @@ def bed_factors(
     i, j = owner[once], hood.sphere[once]
     areas = packing.areas
     exchange = areas[i] * predicted.view_factor
+    if reach is None:
+        far = _far_pairs(packing, size, phi)
+        i, j = np.concatenate([i, far[0]]), np.concatenate([j, far[1]])
+        exchange = np.concatenate([exchange, far[2]])
     n = len(packing)
     both = sparse.coo_array(
         (np.concatenate([exchange, exchange]), (np.concatenate([i, j]), np.concatenate([j, i]))),
@@ -126,6 +137,41 @@ def bed_factors(
         areas,
         float(predicted.extrapolates.mean()) if len(i) else 0.0,
     )
+
+
+def mean_chord(packing: Packing, solid_fraction: float) -> float:
+    """Mean length of free lines between the spheres, 4 (1 - phi) r32 / (3 phi) [m]."""
+    r = packing.radii
+    r32 = float((r**3).sum() / (r**2).sum())
+    return 4.0 * (1.0 - solid_fraction) * r32 / (3.0 * solid_fraction)
+
+
+def _near(packing: Packing, phi: float) -> float:
+    """Distance up to which pairs are evaluated one by one [m]: longer where the bed is open."""
+    mean = float(packing.radii.mean())
+    return float(
+        np.clip(2.0 * mean + CHORDS * mean_chord(packing, phi), REACH * mean, 2.0 * REACH * mean)
+    )
+
+
+def _far_pairs(packing: Packing, near: float, phi: float) -> tuple[Index, Index, Array]:
+    """Pairs beyond ``near``, each once, and their exchange areas A_i F_ij [m2] in a mean field.
+
+    F = F_exact exp(-gap / chord): so far apart there are so many spheres in between that their
+    places do not matter. Pairs that less than UNSEEN of the light reaches are left out.
+    """
+    chord, largest = mean_chord(packing, phi), float(packing.radii.max())
+    far = min(2.0 * largest + chord * np.log(1.0 / UNSEEN), FAR_REACH * float(packing.radii.mean()))
+    if far <= near:
+        return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
+    hood = neighbourhood(packing, far)
+    owner, sphere = hood.owner, hood.sphere
+    chosen = hood.within & (hood.distance > near) & (owner <= sphere)
+    i, j, d = owner[chosen], sphere[chosen], hood.distance[chosen]
+    r_i, r_j = packing.radii[i], packing.radii[j]
+    factor = pair_factor(r_j / d, r_j / r_i) * np.exp(-(d - r_i - r_j) / chord)
+    # A sphere and its own image stand in the list in both directions.
+    return i, j, packing.areas[i] * factor * np.where(i == j, 0.5, 1.0)
 
 
 def _wall_factors(m: WallMarkers, closure: ViewFactorClosure | None) -> tuple[Array, Array]:

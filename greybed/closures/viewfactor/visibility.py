@@ -124,8 +124,13 @@ def _pencil_baseline(m: Markers) -> Array:
 
 def _wall_features(m: Markers) -> Array:
     features = [
-        m["blocked_fraction"], 1.0 / m["distance_over_radius"], m["wall_share"], m["solid_fraction"]
-    ]  # fmt: skip
+        m["blocked_fraction"],
+        # Spheres deep in the bed differ in what little they see.
+        np.log(1e-3 + (1.0 - m["blocked_fraction"])),
+        1.0 / m["distance_over_radius"],
+        m["wall_share"],
+        m["solid_fraction"],
+    ]
     return np.stack(features, axis=-1)
 
 
@@ -178,7 +183,13 @@ MARKER_SETS = {
     "wall": MarkerSet(
         "wall",
         (SHARE, WALL_DISTANCE, WALL_BLOCKED, FRACTION),
-        ("blocked_fraction", "radius / distance", "wall_share", "solid_fraction"),
+        (
+            "blocked_fraction",
+            "log(0.001 + free)",
+            "radius / distance",
+            "wall_share",
+            "solid_fraction",
+        ),
         _wall_features,
         _pencil_gate,
         _pencil_baseline,
