@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from greybed._version import __version__
 from greybed.closures.viewfactor import MARKER_SETS, PairMarkers, neighbourhood, pair_markers
-from greybed.closures.viewfactor.bed import REACH, inner_fraction
+from greybed.closures.viewfactor.bed import inner_fraction, near_reach
 from greybed.closures.viewfactor.exact import pair_factor
 from greybed.closures.viewfactor.walls import wall_distance, wall_markers
 from greybed.core import InputError, Packing
@@ -269,7 +269,8 @@ def wall_rows_of(packing: Packing, emitters: int, rays: int, seed: int) -> dict[
     """Trace the spheres near walls and give a row for every (emitter, wall)."""
     if not packing.walls:
         return {name: np.empty(0) for name in WALL_COLUMNS}
-    reach, phi = REACH * float(packing.radii.mean()), inner_fraction(packing)
+    phi = inner_fraction(packing)
+    reach = near_reach(packing, phi)
     everyone = np.arange(len(packing))
     # Nobody deep in the bed sees a wall; there are three emitters here for one of the pairs.
     near = np.min(

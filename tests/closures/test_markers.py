@@ -132,7 +132,7 @@ def test_walls_take_what_the_rows_leave():
     # A sphere on top sees the unbounded floor past the bed's sides, but less than the lowest.
     assert b.wall_factors[highest, 0] < 0.5 * b.wall_factors[lowest, 0]
     # What the floor takes would have escaped without it; its free share is exact, one half, and
-    # not counted, so that half a line of 2048 stays.
+    # not counted, so that half a line of 4096 stays.
     assert a.escaped[lowest] == pytest.approx(
         b.escaped[lowest] + b.wall_factors[lowest, 0], abs=1e-3
     )

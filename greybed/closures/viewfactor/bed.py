@@ -24,7 +24,7 @@ Index = NDArray[np.int64]
 # Reach of the pair sum where nothing else is asked for, in mean radii: at solid fractions of
 # settled beds the pairs beyond it hold less than one percent of a row.
 REACH = 10.0
-CHORDS = 3.0
+CHORDS = 4.0
 # Beyond it pairs are counted in a mean field, down to this share of light and up to this reach.
 UNSEEN = 5e-3
 FAR_REACH = 40.0
@@ -85,14 +85,14 @@ def bed_factors(
 
     Notes
     -----
-    Each wall's exact free share is multiplied with its visibility along 2048 fixed lines a
+    Each wall's exact free share is multiplied with its visibility along 4096 fixed lines a
     sphere, blocked by the real neighbours; the opening is what those lines see of it. Rows add up
     to one within the errors; :meth:`ViewFactorClosure.factors` balances them.
     """
     phi = inner_fraction(packing) if solid_fraction is None else solid_fraction
     if not 0.0 < phi < 1.0:
         raise RangeError(f"solid_fraction = {phi:g} [-] must lie in (0, 1); check the packing.")
-    size = _near(packing, phi) if reach is None else float(reach)
+    size = near_reach(packing, phi) if reach is None else float(reach)
     if not (np.isfinite(size) and size > 0.0):
         raise RangeError(f"reach = {size:g} [m] must be finite and above 0; leave it out for 10 r.")
     hood = neighbourhood(packing, size)
@@ -146,7 +146,7 @@ def mean_chord(packing: Packing, solid_fraction: float) -> float:
     return 4.0 * (1.0 - solid_fraction) * r32 / (3.0 * solid_fraction)
 
 
-def _near(packing: Packing, phi: float) -> float:
+def near_reach(packing: Packing, phi: float) -> float:
     """Distance up to which pairs are evaluated one by one [m]: longer where the bed is open."""
     mean = float(packing.radii.mean())
     return float(
