@@ -4,6 +4,8 @@
 // Build: g++ -O3 -march=native embree_rate.cpp -lembree3 -lpthread   (Debian: libembree-dev)
 // Run:   embree_rate packing.bin RAYS_PER_SPHERE THREADS WIDTH
 //        WIDTH 1, 4, 8 or 16: rays per call (rtcIntersect1, 4, 8, 16); 0: a stream (rtcIntersect1M)
+//   or   embree_rate packing.bin rays.bin hits.bin
+//        int32 emitter and 6 float32 (origin, direction) a ray in, int32 sphere (-1: none) out
 //
 // What is done for Embree: build quality HIGH, incoherent rays, no robust mode, denormals flushed as
 // its manual asks, one packet call for many rays where asked. Rays are made as cheaply as in greybed
@@ -138,15 +140,36 @@ static long trace_packet(RTCScene scene, const float *p, unsigned self, int rays
   return hits;
 }
 
+// What given rays meet, one by one, for a comparison hit by hit.
+static int write_hits(RTCScene scene, const std::vector<float> &p, const char *from, const char *to) {
+  struct Given { int32_t self; float o[3], d[3]; };
+  FILE *f = fopen(from, "rb"), *g = fopen(to, "wb");
+  if (!f || !g) { fprintf(stderr, "cannot open %s or %s\n", from, to); return 2; }
+  Given ray;
+  while (fread(&ray, sizeof ray, 1, f) == 1) {
+    Ray r = {{ray.o[0], ray.o[1], ray.o[2]}, {ray.d[0], ray.d[1], ray.d[2]}, p[4 * ray.self + 3]};
+    RTCRayHit h = single(r);
+    RTCIntersectContext c = context();
+    rtcIntersect1(scene, &c, &h);
+    const int32_t hit = counts(scene, &c, h, ray.self, r.r) ? int32_t(h.hit.primID) : -1;
+    fwrite(&hit, 4, 1, g);
+  }
+  fclose(f);
+  fclose(g);
+  return 0;
+}
+
 int main(int argc, char **argv) {
-  if (argc != 5) { fprintf(stderr, "usage: embree_rate packing.bin RAYS THREADS WIDTH\n"); return 2; }
+  if (argc != 4 && argc != 5) {
+    fprintf(stderr, "usage: embree_rate packing.bin RAYS THREADS WIDTH | packing.bin rays.bin hits.bin\n");
+    return 2;
+  }
   int n;
   FILE *f = fopen(argv[1], "rb");
   if (!f || fread(&n, 4, 1, f) != 1) { fprintf(stderr, "cannot read %s\n", argv[1]); return 2; }
   std::vector<float> p(4 * n);
   if (fread(p.data(), 16, n, f) != size_t(n)) { fprintf(stderr, "%s is cut\n", argv[1]); return 2; }
   fclose(f);
-  const int rays = atoi(argv[2]), threads = atoi(argv[3]), width = atoi(argv[4]);
   RTCDevice device = rtcNewDevice(getenv("EMBREE_CONFIG"));
   RTCScene scene = rtcNewScene(device);
   RTCGeometry g = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_SPHERE_POINT);
@@ -157,7 +180,9 @@ int main(int argc, char **argv) {
   rtcAttachGeometry(scene, g);
   rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
   rtcCommitScene(scene);
+  if (argc == 4) return write_hits(scene, p, argv[2], argv[3]);
 
+  const int rays = atoi(argv[2]), threads = atoi(argv[3]), width = atoi(argv[4]);
   const auto begin = std::chrono::steady_clock::now();
   std::vector<long> hits(threads, 0);
   auto work = [&](int t) {

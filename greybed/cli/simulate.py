@@ -34,6 +34,7 @@ def run(options: argparse.Namespace) -> int:
     from greybed.core.readers import read_packing
     from greybed.core.writers import write_packing
     from greybed.coupling.case import load_case, run_case, summary, view_factors
+    from greybed.coupling.case_walls import MeshTable
 
     if options.threads is not None and options.threads < 1:
         raise InputError(
@@ -56,6 +57,7 @@ def run(options: argparse.Namespace) -> int:
         bed, result = run_case(case, packing, rows, on_progress=on_progress)
 
     inputs = [options.case, case.packing.file]
+    inputs += [wall.file for wall in case.wall if isinstance(wall, MeshTable)]
     if case.radiation.closure is not None:
         inputs.append(case.radiation.closure)
     _write_temperatures(folder / "temperatures.csv", packing, result.temperatures)

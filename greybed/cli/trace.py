@@ -3,6 +3,7 @@
 Examples:
   greybed trace greybed/datasets/packings/settled_mono_4k.dump --rays 10000 --out runs/trace
   greybed trace bed.csv --wall plane:0,0,0:0,0,1 --wall cylinder:0,0,0:0,0,1:30mm --out runs/trace
+  greybed trace bed.csv --wall mesh:oven.stl:mm --wall disc:0,0,0:0,0,1:30mm --out runs/trace
 
 Writes view_factors.h5 and summary.json. A run that was stopped, however abruptly, goes on where
 it stopped when the same command is given again, and ends with the same bits. So do runs on
@@ -55,9 +56,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="W",
-        help="plane:X,Y,Z:NX,NY,NZ (point, normal into the bed) or cylinder:PX,PY,PZ:AX,AY,AZ:R "
-        "(axis, inner radius), lengths in metres or with a unit (30mm); may be repeated; replaces "
-        "the walls of an HDF5 packing",
+        help="plane:X,Y,Z:NX,NY,NZ (point, normal into the bed), "
+        "cylinder:X,Y,Z:AX,AY,AZ:R[:LENGTH] (point of the axis, axis, inner radius), "
+        "cone:X,Y,Z:AX,AY,AZ:R:END_R:LENGTH, "
+        "disc:X,Y,Z:NX,NY,NZ:R, box:X,Y,Z:X,Y,Z (lower, upper corner; six walls), "
+        "polygon:X,Y,Z:X,Y,Z:X,Y,Z... or mesh:FILE[:UNIT] (STL, OBJ, PLY; a wall for each group); "
+        "lengths in metres or with a unit (30mm); may be repeated; replaces the walls of an HDF5 "
+        "packing",
     )
     parser.add_argument(
         "--max-distance",
@@ -80,30 +85,72 @@ def _number(text: str, where: str, *, length: bool) -> float:
         raise InputError(f"{where}: {text!r} is not a number; give one without unit.") from None
 
 
-def parse_wall(text: str, name: str) -> Wall:
-    """Read a wall as ``--wall`` takes it.
+# kind -> how it is typed, an example, numbers in each part
+WALLS = {
+    "plane": ("plane:X,Y,Z:NX,NY,NZ", "plane:0,0,0:0,0,1", ([3, 3],)),
+    "cylinder": (
+        "cylinder:X,Y,Z:AX,AY,AZ:R[:LENGTH]",
+        "cylinder:0,0,0:0,0,1:30mm",
+        ([3, 3, 1], [3, 3, 1, 1]),
+    ),
+    "cone": (
+        "cone:X,Y,Z:AX,AY,AZ:R:END_R:LENGTH",
+        "cone:0,0,0:0,0,1:10mm:30mm:50mm",
+        ([3, 3, 1, 1, 1],),
+    ),
+    "disc": ("disc:X,Y,Z:NX,NY,NZ:R", "disc:0,0,0:0,0,1:30mm", ([3, 3, 1],)),
+    "box": ("box:X,Y,Z:X,Y,Z", "box:0,0,0:1cm,1cm,2cm", ([3, 3],)),
+    "polygon": ("polygon:X,Y,Z:X,Y,Z:X,Y,Z...", "polygon:0,0,0:1cm,0,0:0,1cm,0", ()),
+}
+
+
+def parse_walls(text: str, name: str) -> tuple[Wall, ...]:
+    """Read what ``--wall`` takes; a box is six walls, a mesh file one for each of its groups.
 
     Raises
     ------
     InputError
-        If it is neither a plane nor a cylinder, or a number is missing or wrong.
+        If the kind is unknown, a number is missing or wrong, or a file cannot be used.
     """
     from greybed.core.errors import InputError
-    from greybed.core.walls import Cylinder, Plane
+    from greybed.core.readers import read_mesh
+    from greybed.core.walls import Cone, Cylinder, Disc, Plane, Polygon, box_walls
 
     where = f"--wall {text}"
-    kind, *parts = text.split(":")
-    vectors = [part.split(",") for part in parts]
-    if (kind, [len(v) for v in vectors]) not in (("plane", [3, 3]), ("cylinder", [3, 3, 1])):
+    kind, _, rest = text.partition(":")
+    if kind == "mesh":
+        # A colon may also stand in the name of the file.
+        named = Path(rest).suffix.lower() in (".stl", ".obj", ".ply")
+        file, _, unit = (rest, "", "m") if named else rest.rpartition(":")
+        if not file:
+            raise InputError(f"{where}: give mesh:FILE[:UNIT], such as mesh:oven.stl:mm.")
+        return read_mesh(file, unit, name)
+    if kind not in WALLS:
         raise InputError(
-            f"{where}: give plane:X,Y,Z:NX,NY,NZ or cylinder:PX,PY,PZ:AX,AY,AZ:R, "
-            "such as plane:0,0,0:0,0,1."
+            f"{where}: give {', '.join(said for said, _, _ in WALLS.values())} or mesh:FILE[:UNIT]."
         )
-    x, y, z = (_number(word, where, length=True) for word in vectors[0])
-    u, v, w = (_number(word, where, length=False) for word in vectors[1])
+    parts = [part.split(",") for part in rest.split(":")]
+    counts = [len(part) for part in parts]
+    said, example, layouts = WALLS[kind]
+    if counts not in layouts and not (kind == "polygon" and counts == [3] * max(len(counts), 3)):
+        raise InputError(f"{where}: give {said}, such as {example}.")
+    numbers = [
+        [_number(word, where, length=kind in ("box", "polygon") or k != 1) for word in part]
+        for k, part in enumerate(parts)
+    ]
+    if kind == "polygon":
+        return (Polygon(tuple((x, y, z) for x, y, z in numbers), name),)
+    (x, y, z), (u, v, w) = numbers[:2]
+    sizes = [part[0] for part in numbers[2:]]
+    if kind == "box":
+        return box_walls((x, y, z), (u, v, w), name)
     if kind == "plane":
-        return Plane((x, y, z), (u, v, w), name)
-    return Cylinder((x, y, z), (u, v, w), _number(vectors[2][0], where, length=True), name)
+        return (Plane((x, y, z), (u, v, w), name),)
+    if kind == "disc":
+        return (Disc((x, y, z), (u, v, w), sizes[0], name),)
+    if kind == "cone":
+        return (Cone((x, y, z), (u, v, w), sizes[0], sizes[1], sizes[2], name),)
+    return (Cylinder((x, y, z), (u, v, w), sizes[0], name, *sizes[1:]),)
 
 
 class State:
@@ -158,6 +205,7 @@ def _rows(result: ViewFactors, first: int, last: int) -> dict[str, NDArray[Any]]
         "walls": result.wall_factors[rows],
         "wall_stderr": result.wall_stderr[rows],
         "escaped": result.escaped[rows],
+        "escaped_stderr": result.escaped_stderr[rows],
         "buried": result.buried[rows],
         "areas": result.areas[rows],
         "seconds": np.array([result.seconds]),
@@ -179,11 +227,13 @@ def _joined(parts: list[dict[str, NDArray[Any]]], rays: int, seed: int) -> ViewF
         wall_factors=whole["walls"],
         wall_stderr=whole["wall_stderr"],
         escaped=whole["escaped"],
+        escaped_stderr=whole["escaped_stderr"],
         buried=whole["buried"],
         areas=whole["areas"],
         rays=rays,
         seed=seed,
         seconds=float(whole["seconds"].sum()),
+        cost=np.full(n, rays),
     )
 
 
@@ -283,7 +333,11 @@ def run(options: argparse.Namespace) -> int:
     from greybed.raytrace.tally import available_threads
 
     names = [f"{text.partition(':')[0]}_{k + 1}" for k, text in enumerate(options.wall)]
-    walls = [parse_wall(text, name) for text, name in zip(options.wall, names, strict=True)]
+    walls = [
+        wall
+        for text, name in zip(options.wall, names, strict=True)
+        for wall in parse_walls(text, name)
+    ]
     limit = math.inf
     if options.max_distance is not None:
         limit = parse_quantity(options.max_distance, "length", "--max-distance")

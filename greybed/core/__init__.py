@@ -8,17 +8,22 @@ from greybed.core.errors import (
     VerificationError,
 )
 from greybed.core.packing import Overlaps, Packing
-from greybed.core.walls import Cylinder, Plane, Wall
+from greybed.core.walls import Cone, Cylinder, Disc, Mesh, Plane, Polygon, Wall, box_walls
 
 __all__ = [
+    "Cone",
     "Cylinder",
+    "Disc",
     "GreybedError",
     "InputError",
+    "Mesh",
     "OutputError",
     "Overlaps",
     "Packing",
     "Plane",
+    "Polygon",
     "RangeError",
     "VerificationError",
     "Wall",
+    "box_walls",
 ]

@@ -144,7 +144,7 @@ class Packing:
     periodic : three bools
         Which directions repeat.
     walls : sequence of walls
-        Planes and cylinders that bound the bed.
+        What bounds the bed or stands in it; see :mod:`greybed.core.walls`.
     source : str
         Where the packing came from (a file name, a generator), for messages and reports.
 

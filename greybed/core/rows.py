@@ -30,7 +30,10 @@ class Rows:
     escaped : array, shape (n,)
         Fraction that leaves through the opening [-].
     areas : array, shape (n,)
-        Surface of each sphere [m2].
+        Surface of each sphere [m2]; times its emissivity where ``emissivity`` is set.
+    emissivity : array, shape (n,), or None
+        Set for exchange factors, which hold reflections at these emissivities [-]: they say who
+        absorbs, not who is hit, and walls and opening are then what absorbs there.
 
     Raises
     ------
@@ -42,6 +45,7 @@ class Rows:
     wall_factors: Array
     escaped: Array
     areas: Array
+    emissivity: Array | None = None
 
     def __post_init__(self) -> None:
         factors = csr_matrix(self.factors, dtype=np.float64)
@@ -83,7 +87,8 @@ class Rows:
         Parameters
         ----------
         result : object
-            Anything with ``factors``, ``wall_factors``, ``escaped`` and, optionally, ``areas``.
+            Anything with ``factors``, ``wall_factors``, ``escaped`` and, optionally, ``areas``;
+            with ``emission_areas`` and ``emissivity``, too, for exchange factors.
         packing : Packing
             The bed that they belong to.
 
@@ -97,12 +102,7 @@ class Rows:
         InputError
             If the rows are not those of this packing.
         """
-        if isinstance(result, cls):
-            rows = result
-        else:
-            areas = getattr(result, "areas", None)
-            areas = packing.areas if areas is None else areas
-            rows = cls(result.factors, result.wall_factors, result.escaped, areas)
+        rows = cls.taken(result, packing.areas)
         have = (len(rows.areas), rows.wall_factors.shape[1])
         if have != (len(packing), packing.n_walls):
             raise InputError(
@@ -111,6 +111,33 @@ class Rows:
                 "this packing."
             )
         return rows
+
+    @classmethod
+    def taken(cls, result: Any, areas: Array | None = None) -> Rows:
+        """Take rows as :meth:`of` does, with ``areas`` [m2] where the result has none.
+
+        Exchange factors of black spheres are view factors.
+
+        Raises
+        ------
+        InputError
+            If there are no areas, or factors of several emissivities at once.
+        """
+        if isinstance(result, cls):
+            return result
+        if not hasattr(result, "factors"):
+            raise InputError(
+                f"{type(result).__name__} has no rows of factors; give one result, e.g. results[0] "
+                "of several emissivities."
+            )
+        own = getattr(result, "areas", None)
+        emissivity = None
+        if getattr(result, "emission_areas", None) is not None and (result.emissivity < 1.0).any():
+            own, emissivity = result.emission_areas, np.array(result.emissivity)
+        own = areas if own is None else own
+        if own is None:
+            raise InputError("the factors come without areas; give Rows with areas [m2].")
+        return cls(result.factors, result.wall_factors, result.escaped, own, emissivity)
 
     @cached_property
     def sums(self) -> Array:
@@ -194,4 +221,4 @@ def balanced(rows: Rows, *, tolerance: float = 1e-14, max_iterations: int = 5000
             "check that walls and opening are part of the rows."
         )
     factors = (diags(x / a) @ s @ diags(x)).tocsr()
-    return Rows(factors, rows.wall_factors * x[:, None], rows.escaped * x, a)
+    return Rows(factors, rows.wall_factors * x[:, None], rows.escaped * x, a, rows.emissivity)

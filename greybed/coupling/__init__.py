@@ -2,6 +2,11 @@
 
 from greybed.coupling.conduction import Conductances, contact_conductances
 from greybed.coupling.radiation import NetRadiation, net_radiation
+from greybed.coupling.radiative_network import (
+    RadiativeResult,
+    pairwise_network,
+    radiative_network,
+)
 from greybed.coupling.results import SolverError, Status, ThermalResult
 from greybed.coupling.rows import Rows, balanced
 from greybed.coupling.thermal import Material, ThermalBed
@@ -10,6 +15,7 @@ __all__ = [
     "Conductances",
     "Material",
     "NetRadiation",
+    "RadiativeResult",
     "Rows",
     "SolverError",
     "Status",
@@ -18,4 +24,6 @@ __all__ = [
     "balanced",
     "contact_conductances",
     "net_radiation",
+    "pairwise_network",
+    "radiative_network",
 ]

@@ -11,61 +11,25 @@ from typing import Any
 
 import numpy as np
 
-from greybed.core.config import choice, quantity, read_case, tables, vector, whole
+from greybed.core.config import choice, quantity, read_case, tables, whole
 from greybed.core.errors import InputError
 from greybed.core.packing import Packing
-from greybed.core.walls import Cylinder, Plane, Wall
+from greybed.core.walls import Wall
+from greybed.coupling.case_walls import (
+    HEAT,
+    ConeTable,
+    CylinderTable,
+    DiscTable,
+    MeshTable,
+    PlaneTable,
+    check_heat,
+)
 from greybed.coupling.results import ThermalResult
 from greybed.coupling.rows import Rows
 from greybed.coupling.thermal import Material, ThermalBed
 
-
-def _check_heat(place: str, temperature: float | None, heat: str) -> None:
-    if (temperature is None) != (heat == "adiabatic"):
-        said = "has no temperature" if temperature is None else "has a temperature and is adiabatic"
-        raise InputError(f'{place} {said}; give either temperature = ... or heat = "adiabatic".')
-
-
-HEAT = ("fixed", "adiabatic")
 MOST_REPEATS = 60  # of a solve whose conductivity depends on temperature
 SETTLED = 1e-8  # change of the temperatures at which it is done [K]
-
-
-@dataclass(frozen=True, kw_only=True)
-class PlaneTable:
-    """``[[wall]]`` with ``kind = "plane"``."""
-
-    name: str
-    point: tuple[float, float, float] = vector("length", (0.0, 0.0, 0.0))  # [m]
-    normal: tuple[float, float, float] = vector("dimensionless")  # into the bed, any length [-]
-    temperature: float | None = quantity("temperature", None, above=0.0)  # [K]
-    heat: str = choice(HEAT, "fixed")
-
-    def __post_init__(self) -> None:
-        _check_heat(f"wall {self.name!r}", self.temperature, self.heat)
-
-    def wall(self) -> Wall:
-        """The wall itself."""
-        return Plane(self.point, self.normal, self.name)
-
-
-@dataclass(frozen=True, kw_only=True)
-class CylinderTable:
-    """``[[wall]]`` with ``kind = "cylinder"``; the bed is inside."""
-
-    name: str
-    point: tuple[float, float, float] = vector("length", (0.0, 0.0, 0.0))  # of the axis [m]
-    axis: tuple[float, float, float] = vector("dimensionless", (0.0, 0.0, 1.0))  # any length [-]
-    radius: float = quantity("length", above=0.0)  # [m]
-    temperature: float | None = quantity("temperature", None, above=0.0)  # [K]
-    heat: str = choice(HEAT, "fixed")
-
-    def __post_init__(self) -> None:
-        _check_heat(f"wall {self.name!r}", self.temperature, self.heat)
-
-    def wall(self) -> Wall:
-        """The wall itself."""
-        return Cylinder(self.point, self.axis, self.radius, self.name)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +47,7 @@ class OpeningTable:
     heat: str = choice(HEAT, "fixed")
 
     def __post_init__(self) -> None:
-        _check_heat("the opening", self.temperature, self.heat)
+        check_heat("the opening", self.temperature, self.heat)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,12 +73,18 @@ class RadiationTable:
     source: str = choice(("traced", "closure", "off"))
     rays: int = whole(10_000, at_least=1)  # per sphere, for traced [-]
     seed: int = whole(0, at_least=0)
+    reflections: bool = False  # traced only: exchange factors instead of view factors
     strength: float = quantity("dimensionless", 1.0, above=0.0)  # on the exchange; 1 is physics
     closure: Path | None = None  # relative to the case, for closure
 
     def __post_init__(self) -> None:
         if (self.closure is None) == (self.source == "closure"):
             raise InputError('give closure = "path" with source = "closure", and only there.')
+        if self.reflections and self.source != "traced":
+            raise InputError(
+                f'radiation.reflections = true needs source = "traced", not "{self.source}"; '
+                "remove it or trace."
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,8 +118,16 @@ class ThermalCase:
 
     kind: str = choice(("thermal-bed",))
     packing: PackingTable
-    wall: tuple[PlaneTable | CylinderTable, ...] = tables(
-        "kind", {"plane": PlaneTable, "cylinder": CylinderTable}, ()
+    wall: tuple[PlaneTable | CylinderTable | ConeTable | DiscTable | MeshTable, ...] = tables(
+        "kind",
+        {
+            "plane": PlaneTable,
+            "cylinder": CylinderTable,
+            "cone": ConeTable,
+            "disc": DiscTable,
+            "mesh": MeshTable,
+        },
+        (),
     )
     opening: OpeningTable | None = None
     material: MaterialTable
@@ -182,7 +160,9 @@ def load_case(path: str | os.PathLike[str]) -> ThermalCase:
 def view_factors(
     case: ThermalCase, packing: Packing, *, threads: int | None = None, show: bool = False
 ) -> Rows | None:
-    """Rows of view factors from where the case says, or None without radiation.
+    """Rows of view or exchange factors from where the case says, or None without radiation.
+
+    With exchange factors adiabatic walls reflect diffusely, the others are black.
 
     Parameters
     ----------
@@ -213,9 +193,20 @@ def view_factors(
     else:
         from greybed import raytrace
 
-        result = raytrace.view_factors(
-            packing, rays=radiation.rays, seed=radiation.seed, threads=threads, show_progress=show
-        )
+        how: dict[str, Any] = {
+            "rays": radiation.rays,
+            "seed": radiation.seed,
+            "threads": threads,
+            "show_progress": show,
+        }
+        if radiation.reflections:
+            absorbs = [float(w.temperature is not None) for w in case.wall]
+            grey = case.material.emissivity
+            (result,) = raytrace.exchange_factors(
+                packing, grey, wall_emissivity=absorbs if absorbs else 1.0, **how
+            )
+        else:
+            result = raytrace.view_factors(packing, **how)
     rows = Rows.of(result, packing)
     return replace(rows, areas=rows.areas * radiation.strength)
 

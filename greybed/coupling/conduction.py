@@ -11,7 +11,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 
 from greybed.core.errors import InputError
 from greybed.core.packing import Packing
-from greybed.core.walls import Plane, Wall
+from greybed.core.walls import Cone, Cylinder, Plane, Wall
 
 Array = NDArray[np.float64]
 
@@ -61,6 +61,27 @@ def per_sphere(values: ArrayLike, n: int, name: str, unit: str, *, at_most: floa
     return np.array(np.broadcast_to(array, (n,)))
 
 
+def _from_axis(centres: Array, wall: Cylinder | Cone) -> tuple[Array, Array]:
+    """Place along the axis of a round wall and distance from it, shape (n,) each [m]."""
+    offset, axis = centres - np.asarray(wall.point), np.asarray(wall.axis)
+    along = offset @ axis
+    return along, np.linalg.norm(offset - np.outer(along, axis), axis=1)
+
+
+def _curvature(centres: Array, wall: Cylinder | Cone) -> Array:
+    """Curvature of a bounded round wall where it is nearest, above zero inside [1/m]."""
+    length = wall.length or 0.0
+    widening = (wall.end_radius if isinstance(wall, Cone) else wall.radius) - wall.radius
+    along, from_axis = _from_axis(centres, wall)
+    place = (from_axis - wall.radius) * widening + along * length
+    place /= widening**2 + length**2
+    radius = wall.radius + place * widening
+    on_side = (place > 0.0) & (place < 1.0)
+    # Across the slope; along it the wall is straight (Meusnier).
+    across = length / (np.hypot(length, widening) * np.where(on_side, radius, 1.0))
+    return np.where(on_side, np.where(from_axis < radius, across, -across), 0.0)
+
+
 def wall_contacts(packing: Packing, wall: Wall) -> tuple[Array, Array]:
     """Overlap and effective radius of every sphere with one wall.
 
@@ -68,7 +89,7 @@ def wall_contacts(packing: Packing, wall: Wall) -> tuple[Array, Array]:
     ----------
     packing : Packing
         The bed.
-    wall : Plane or Cylinder
+    wall : any wall
         One of its walls.
 
     Returns
@@ -76,8 +97,9 @@ def wall_contacts(packing: Packing, wall: Wall) -> tuple[Array, Array]:
     overlap : (n,) array
         Depth of the sphere in the wall, negative where there is a gap [m].
     effective_radius : (n,) array
-        r for a plane; for the inside of a cylinder of radius R the geometric mean
-        ``1/sqrt(1/r (1/r - 1/R))`` of the two relative radii of curvature [m].
+        r for a plane, disc, polygon or mesh; for the inside of a cylinder or cone of radius of
+        curvature R the geometric mean ``1/sqrt(1/r (1/r - 1/R))`` of the two relative radii of
+        curvature, with 1/R below zero on the outside of a tube [m].
 
     Raises
     ------
@@ -87,23 +109,30 @@ def wall_contacts(packing: Packing, wall: Wall) -> tuple[Array, Array]:
     Notes
     -----
     Source: Johnson, Contact Mechanics (1985), sections 4.1-4.2; replacing the slightly elliptic
-    spot by a circle of the mean curvature changes the area by less than 1 % for r/R < 0.5.
+    spot by a circle of the mean curvature changes the area by less than 1 % for r/R < 0.5. Edges of
+    bounded walls are taken as flat: the spot of a sphere on an edge is smaller than that.
     """
     r = packing.radii
-    offset = packing.centres - np.asarray(wall.point)
     if isinstance(wall, Plane):
-        gap, effective = offset @ np.asarray(wall.normal) - r, r
+        offset = packing.centres - np.asarray(wall.point)
+        gap, curvature = offset @ np.asarray(wall.normal) - r, np.zeros(len(r))
+    elif isinstance(wall, Cylinder) and wall.length is None:
+        gap = wall.radius - _from_axis(packing.centres, wall)[1] - r
+        curvature = np.full(len(r), 1.0 / wall.radius)
     else:
-        axis = np.asarray(wall.axis)
-        radial = np.linalg.norm(offset - np.outer(offset @ axis, axis), axis=1)
-        if (r >= wall.radius).any():
-            i = int((r >= wall.radius).argmax())
-            raise InputError(
-                f"{packing.source}: sphere {i} with radius {r[i]:g} [m] does not fit into wall "
-                f"{wall.name!r} of radius {wall.radius:g} [m]; check units and walls."
-            )
-        gap = wall.radius - radial - r
-        effective = r / np.sqrt(1.0 - r / wall.radius)
+        from greybed.core.patches import distances
+
+        gap = distances([wall], packing.centres) - r
+        curvature = np.zeros(len(r))
+        if isinstance(wall, Cone | Cylinder):
+            curvature = _curvature(packing.centres, wall)
+    if (r * curvature >= 1.0).any():
+        i = int((r * curvature).argmax())
+        raise InputError(
+            f"{packing.source}: sphere {i} with radius {r[i]:g} [m] does not fit into wall "
+            f"{wall.name!r} of radius {1.0 / curvature[i]:g} [m]; check units and walls."
+        )
+    effective = r / np.sqrt(1.0 - r * curvature)
     behind = gap < -r
     if behind.any():
         i = int(behind.argmax())

@@ -69,8 +69,8 @@ class ThermalBed:
     packing : Packing
         The bed with its walls.
     rows : Rows, object or None
-        View factors of this packing, traced or from a closure (anything ``Rows.of`` takes);
-        balanced here. None switches radiation off.
+        View factors of this packing, traced or from a closure, or exchange factors (anything
+        ``Rows.of`` takes); balanced here. None switches radiation off.
     material : Material
         Properties of the spheres.
     wall_temperatures : sequence of n_walls floats or None
@@ -94,7 +94,8 @@ class ThermalBed:
     Each sphere has one temperature (conductance of a contact well below k r: true for stiff
     spheres) and constant properties; gas in the gaps is left out. Walls exchange heat with the
     bed only: what a wall sends straight through the opening or to another wall is not counted.
-    Radiation below emissivity 1 has the bias that ``net_radiation`` states.
+    From view factors, radiation below emissivity 1 has the bias that ``net_radiation`` states;
+    from exchange factors it has none.
 
     Examples
     --------

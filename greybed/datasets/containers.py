@@ -155,11 +155,14 @@ def wall_overlap(packing: Packing) -> float:
     """Deepest overlap of a sphere with a wall, over its radius [-]; 0 where none overlaps."""
     deepest = 0.0
     for wall in packing.walls:
-        away = packing.centres - np.array(wall.point)
         if isinstance(wall, Plane):
-            gap = away @ np.array(wall.normal)
-        else:
-            axis = np.array(wall.axis)
+            gap = (packing.centres - np.array(wall.point)) @ np.array(wall.normal)
+        elif isinstance(wall, Cylinder) and wall.length is None:
+            away, axis = packing.centres - np.array(wall.point), np.array(wall.axis)
             gap = wall.radius - np.linalg.norm(away - np.outer(away @ axis, axis), axis=1)
+        else:
+            from greybed.core.patches import distances
+
+            gap = distances([wall], packing.centres)
         deepest = max(deepest, float(((packing.radii - gap) / packing.radii).max()))
     return deepest

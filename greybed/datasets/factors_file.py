@@ -1,4 +1,4 @@
-"""View factors in HDF5, version 1: sparse rows with errors, walls, hash of the packing."""
+"""View factors in HDF5, version 2: sparse rows with errors, walls, hash of the packing."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ from greybed.core.errors import GreybedError, InputError
 from greybed.core.files import atomic_path
 from greybed.core.packing import Packing
 from greybed.core.readers.opening import listed, mapped, shown
-from greybed.core.walls import Plane
+from greybed.core.records import record
+from greybed.core.walls import Cylinder, Plane, Wall
 from greybed.raytrace import ViewFactors
 
 FORMAT = "greybed-view-factors"
-VERSION = 1
+VERSION = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,17 +68,23 @@ class StoredFactors:
 
 def packing_hash(packing: Packing) -> str:
     """SHA-256 of everything that view factors depend on, not of names or files."""
-    walls = [
-        ("plane", *w.point, *w.normal)
-        if isinstance(w, Plane)
-        else ("cylinder", *w.point, *w.axis, float(w.radius))
-        for w in packing.walls
-    ]
+    walls = [_shape(w) for w in packing.walls]
     box = None if packing.box is None else packing.box.tolist()
     digest = hashlib.sha256(json.dumps([len(packing), box, packing.periodic, walls]).encode())
     for array in (packing.centres, packing.radii):
         digest.update(np.ascontiguousarray(array, dtype="<f8").tobytes())
     return digest.hexdigest()
+
+
+def _shape(wall: Wall) -> object:
+    """What a wall is to rays, whatever its name."""
+    # These two as they have always been written, so that older files keep their packing.
+    if isinstance(wall, Plane):
+        return ("plane", *wall.point, *wall.normal)
+    if isinstance(wall, Cylinder) and wall.length is None:
+        return ("cylinder", *wall.point, *wall.axis, float(wall.radius))
+    said = ("name", "dropped", "watertight", "winding_consistent")
+    return {part: value for part, value in record(wall).items() if part not in said}
 
 
 def write_factors(
@@ -124,6 +131,8 @@ def write_factors(
         "walls/factors": (result.wall_factors, "-"),
         "walls/stderr": (result.wall_stderr, "-"),
         "escaped": (result.escaped, "-"),
+        "escaped_stderr": (result.escaped_stderr, "-"),
+        "cost": (result.cost.astype(np.int64), "-"),
         "buried": (result.buried, "-"),
         "areas": (result.areas, "m2"),
         "sums/spheres": (np.bincount(row, result.factors.data, n), "-"),
@@ -138,6 +147,7 @@ def write_factors(
         root.attrs["packing"] = np.bytes_(packing_hash(packing))
         root.attrs["rays"] = result.rays
         root.attrs["seed"] = result.seed
+        root.attrs["reciprocal"] = result.reciprocal
         root.attrs["max_distance"] = max_distance
         root.attrs["wall_names"] = np.bytes_(names)
         for name, (values, unit) in arrays.items():
@@ -232,11 +242,14 @@ def _read(place: Path, root: Any) -> StoredFactors:
         wall_factors=_array(place, root, "walls/factors", (n, len(names)), "f"),
         wall_stderr=_array(place, root, "walls/stderr", (n, len(names)), "f"),
         escaped=_array(place, root, "escaped", (n,), "f"),
+        escaped_stderr=_array(place, root, "escaped_stderr", (n,), "f"),
         buried=_array(place, root, "buried", (n,), "f"),
         areas=_array(place, root, "areas", (n,), "f"),
         rays=int(root.attrs["rays"]),
         seed=int(root.attrs["seed"]),
         seconds=math.nan,
+        cost=_array(place, root, "cost", (n,), "i"),
+        reciprocal=bool(root.attrs["reciprocal"]),
     )
     return StoredFactors(
         result,

@@ -41,6 +41,7 @@ from greybed.datasets.beds import (
     refuse_without_splits,
 )
 from greybed.raytrace import standard_error, view_factors
+from greybed.raytrace.errors import sequence_error
 from greybed.raytrace.tally import MOST_RAYS, image_keys, trace
 
 Array = NDArray[np.float64]
@@ -249,17 +250,20 @@ def rows_of(packing: Packing, emitters: int, rays: int, seed: int) -> dict[str, 
     # Tallies stand in the order (emitter, key): a binary search per emitter pairs them.
     key = image_keys(hood.sphere, hood.image)[choose]
     owner = owner[choose]
+    error = sequence_error(tally.emitter, tally.count, tally.squares, rays, tally.replicates)
     hits = np.zeros(len(key), np.int64)
+    stderr = np.full(len(key), standard_error(0, rays))
     for i in who:
         mine = slice(*np.searchsorted(tally.emitter, [i, i + 1]))
         keys, counts = tally.key[mine], tally.count[mine]
         near = slice(*np.searchsorted(owner, [i, i + 1]))
         at = np.minimum(np.searchsorted(keys, key[near]), len(keys) - 1)
         hits[near] = np.where(keys[at] == key[near], counts[at], 0)
+        stderr[near] = np.where(keys[at] == key[near], error[mine][at], stderr[near])
     columns = {name: getattr(markers, name) for name in MARKERS} | {
         "exact": exact,
         "factor": hits / rays,
-        "stderr": standard_error(hits, rays),
+        "stderr": stderr,
         "weight": 1.0 / (share * first[choose]),
     }
     return {name: column[keep] for name, column in columns.items()}

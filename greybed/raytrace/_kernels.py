@@ -1,4 +1,4 @@
-"""Compiled ray tracing: random streams, emission from spheres, cell-grid traversal, tallies."""
+"""Compiled ray tracing: traversal of the cell grid, buried starts, free rays."""
 
 import math
 
@@ -16,59 +16,6 @@ MAX_ATTEMPTS = 1000
 # Image shifts are coded in ten bits an axis; a ray that goes further counts as escaped.
 IMAGE_LIMIT = 500
 IMAGE_SPAN = 1024
-
-_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
-_MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
-_MIX_2 = np.uint64(0x94D049BB133111EB)
-_S30, _S27, _S31, _S32 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(32)
-_LOW = np.uint64(0xFFFFFFFF)
-_TO_UNIT = 2.0**-31
-
-
-@njit(**_OPTIONS)
-def _mix(z):
-    """Finaliser of SplitMix64 (Steele, Lea & Flood 2014, doi 10.1145/2660193.2660195)."""
-    z = (z ^ (z >> _S30)) * _MIX_1
-    z = (z ^ (z >> _S27)) * _MIX_2
-    return z ^ (z >> _S31)
-
-
-@njit(**_OPTIONS)
-def _in_disc(state):
-    """Uniform point of the unit disc: x, y, x^2 + y^2 and the advanced state."""
-    # Rejection costs 1.27 draws on average, less than a sine and a cosine; one draw gives both
-    # coordinates, on a grid of 2^-31 that no tally can resolve.
-    while True:
-        state += _GOLDEN
-        bits = _mix(state)
-        x = np.float64(np.int32(bits >> _S32)) * _TO_UNIT
-        y = np.float64(np.int32(bits & _LOW)) * _TO_UNIT
-        s = x * x + y * y
-        if s < 1.0:
-            return x, y, s, state
-
-
-@njit(**_OPTIONS)
-def _emit(state):
-    """Ray leaving the unit sphere with a cosine law: direction, surface point, state.
-
-    Seen from far away a Lambertian sphere is a uniformly bright disc whatever the direction.
-    So the direction is isotropic and the point uniform on the disc across it: the same law as
-    a uniform surface point with a cosine-weighted direction, without trigonometry.
-    """
-    x, y, s, state = _in_disc(state)
-    w = 2.0 * math.sqrt(1.0 - s)
-    dx, dy, dz = x * w, y * w, 1.0 - 2.0 * s
-    u, v, s, state = _in_disc(state)
-    # Orthonormal basis without branches: Duff et al. 2017, jcgt.org/published/0006/01/01
-    sign = math.copysign(1.0, dz)
-    a = -1.0 / (sign + dz)
-    b = dx * dy * a
-    lift = math.sqrt(1.0 - s)
-    px = u * (1.0 + sign * dx * dx * a) + v * b + lift * dx
-    py = u * (sign * b) + v * (sign + dy * dy * a) + lift * dy
-    pz = u * (-sign * dx) - v * dy + lift * dz
-    return dx, dy, dz, px, py, pz, state
 
 
 @njit(**_OPTIONS)
@@ -164,7 +111,7 @@ def march(ox, oy, oz, dx, dy, dz, limit, frame, start, items):
 
 
 @njit(**_OPTIONS)
-def _buried(x, y, z, frame, start, items, walls):
+def buried(x, y, z, frame, start, items, walls):
     """Whether a surface point lies inside another sphere or behind a wall."""
     low, inverse = frame.low, frame.inverse
     ix = _cell_of(x, low[0], inverse[0], frame.nx)
@@ -180,113 +127,15 @@ def _buried(x, y, z, frame, start, items, walls):
 
 
 @njit(**_OPTIONS)
-def _wrapped(position, low, edge, periodic):
+def wrapped(position, low, edge, periodic):
     """Coordinate moved into the box along a periodic axis, and the boxes moved by."""
-    if periodic and position < low:
-        return position + edge, -1
-    if periodic and position >= low + edge:
-        return position - edge, 1
-    return position, 0
-
-
-@njit(**_OPTIONS)
-def _count(key, keys, counts, slots, used, mask):
-    """Add one to a key of an open-addressing table; returns the number of slots in use."""
-    slot = np.int64(_mix(np.uint64(key)) & np.uint64(mask))
-    while counts[slot] > 0:
-        if keys[slot] == key:
-            counts[slot] += 1
-            return used
-        slot = (slot + 1) & mask
-    keys[slot] = key
-    counts[slot] = 1
-    slots[used] = slot
-    return used + 1
-
-
-@njit(**_OPTIONS)
-def trace_sphere(
-    sphere, first_ray, last_ray, seed, centre, radius, exposed, images, grid, walls,
-    limit, keys, counts, slots,
-):  # fmt: skip
-    """Trace rays [first_ray, last_ray) of one sphere into the table ``keys``, ``counts``.
-
-    The table's size is a power of two above the number of rays, so it cannot fill up; ``slots``
-    lists its places in use. Returns the number of keys and of starts rejected because they lay on
-    buried surface (-1 where the whole sphere is buried). Ray k of sphere i draws from its own
-    stream, so neither the order nor the thread of the work changes a bit of the result.
-    """
-    mask = keys.size - 1
-    used = 0
-    rejected = 0
-    frame, start, items, owner, image = grid
-    low, edge, periodic = frame.low, frame.edge, frame.periodic
-    stream = _mix(np.uint64(seed) * _MIX_1 + _mix(np.uint64(sphere) + _GOLDEN))
-    for ray in range(first_ray, last_ray):
-        state = _mix(stream + np.uint64(ray) * _GOLDEN)
-        attempt = 0
-        while True:
-            dx, dy, dz, ox, oy, oz, state = _emit(state)
-            ox, sx = _wrapped(centre[0] + radius * ox, low[0], edge[0], periodic[0])
-            oy, sy = _wrapped(centre[1] + radius * oy, low[1], edge[1], periodic[1])
-            oz, sz = _wrapped(centre[2] + radius * oz, low[2], edge[2], periodic[2])
-            if exposed or not _buried(ox, oy, oz, frame, start, items, walls):
-                break
-            attempt += 1
-            if attempt == MAX_ATTEMPTS:
-                return used, -1
-        rejected += attempt
-        at_wall, wall = wall_hit(ox, oy, oz, dx, dy, dz, walls)
-        _, item, mx, my, mz = march(
-            ox, oy, oz, dx, dy, dz, min(limit, at_wall), frame, start, items
-        )
-        if item >= 0:
-            key = np.int64(owner[item])
-            if images:
-                cx = sx + mx + np.int64(image[3 * item + 0]) + IMAGE_SPAN // 2
-                cy = sy + my + np.int64(image[3 * item + 1]) + IMAGE_SPAN // 2
-                cz = sz + mz + np.int64(image[3 * item + 2]) + IMAGE_SPAN // 2
-                key += ((cx * IMAGE_SPAN + cy) * IMAGE_SPAN + cz) << 32
-        elif wall >= 0 and at_wall <= limit:
-            key = np.int64(-1 - wall)
-        else:
-            key = np.int64(ESCAPED)
-        used = _count(key, keys, counts, slots, used, mask)
-    return used, rejected
-
-
-@njit(**_OPTIONS)
-def trace_block(
-    tasks, seed, centres, radii, exposed, images, grid, walls, limit, keys, counts,
-    slots, out_keys, out_counts, ends, rejected,
-):  # fmt: skip
-    """Trace tasks (sphere, first ray, last ray), one after the other, and store their tallies.
-
-    Task k fills ``out_keys`` and ``out_counts`` up to ``ends[k]``, sorted by key. Returns the
-    number of tasks done; fewer than asked where the output is full.
-    """
-    filled = 0
-    counts[:] = 0
-    for k in range(tasks.shape[0]):
-        i = tasks[k, 0]
-        used, rejected[k] = trace_sphere(
-            i, tasks[k, 1], tasks[k, 2], seed, centres[i], radii[i], exposed[i], images, grid,
-            walls, limit, keys, counts, slots,
-        )  # fmt: skip
-        if filled + used > out_keys.size:
-            return k
-        # Into key order, and the table empty again for the next task.
-        found = keys[slots[:used]]
-        order = np.argsort(found)
-        for m in range(used):
-            slot = slots[order[m]]
-            out_keys[filled + m] = keys[slot]
-            out_counts[filled + m] = counts[slot]
-        for m in range(used):
-            counts[slots[m]] = 0
-        filled += used
-        ends[k] = filled
-    return tasks.shape[0]
+    boxes = 0
+    if periodic:
+        while position < low:
+            position, boxes = position + edge, boxes - 1
+        while position >= low + edge:
+            position, boxes = position - edge, boxes + 1
+    return position, boxes
 
 
 @njit(**_OPTIONS)

@@ -1,4 +1,4 @@
-"""Compiled walls: which wall a ray meets first, and whether a point lies behind one."""
+"""Compiled walls: which wall a ray meets first, what lies behind one, how far they are."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from greybed.core import patches as bounded
+from greybed.core._kernels import patch_hit
 from greybed.core.walls import Cylinder, Plane, Wall
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
@@ -22,25 +24,47 @@ class Walls(NamedTuple):
     plane_number: np.ndarray  # (p,) int64
     cylinders: np.ndarray  # (c, 7): point [m], axis, radius [m]
     cylinder_number: np.ndarray  # (c,) int64
+    patches: bounded.Patches  # the bounded walls
 
 
 def tables(walls: Sequence[Wall]) -> Walls:
     """The tables of these walls."""
     planes = [(k, w) for k, w in enumerate(walls) if isinstance(w, Plane)]
-    cylinders = [(k, w) for k, w in enumerate(walls) if isinstance(w, Cylinder)]
+    cylinders = [
+        (k, w) for k, w in enumerate(walls) if isinstance(w, Cylinder) and w.length is None
+    ]
     return Walls(
         len(walls),
         np.array([w.point + w.normal for _, w in planes]).reshape(-1, 6),
         np.array([k for k, _ in planes], dtype=np.int64),
         np.array([(*w.point, *w.axis, w.radius) for _, w in cylinders]).reshape(-1, 7),
         np.array([k for k, _ in cylinders], dtype=np.int64),
+        bounded.tables(walls),
     )
 
 
+def clearance(walls: Sequence[Wall], centres: np.ndarray) -> np.ndarray:
+    """Distance from each of (n, 3) centres to the nearest wall, shape (n,) [m].
+
+    Exact. Below zero behind an unbounded wall; infinite without walls.
+    """
+    free = bounded.distances(walls, centres)
+    for wall in walls:
+        if isinstance(wall, Plane):
+            room = (centres - np.array(wall.point)) @ np.array(wall.normal)
+        elif isinstance(wall, Cylinder) and wall.length is None:
+            offset, axis = centres - np.array(wall.point), np.array(wall.axis)
+            room = wall.radius - np.linalg.norm(offset - np.outer(offset @ axis, axis), axis=1)
+        else:
+            continue
+        free = np.minimum(free, room)
+    return free
+
+
 @njit(**_OPTIONS)
-def wall_hit(ox, oy, oz, dx, dy, dz, walls):
-    """Nearest wall ahead: distance (inf where none) and its number in the packing (-1)."""
-    nearest, wall = np.inf, -1
+def wall_hit_within(ox, oy, oz, dx, dy, dz, limit, walls):
+    """Nearest wall ahead and nearer than ``limit``: distance (``limit``: none) and number (-1)."""
+    nearest, wall = limit, -1
     planes, cylinders = walls.planes, walls.cylinders
     for k in range(planes.shape[0]):
         towards = dx * planes[k, 3] + dy * planes[k, 4] + dz * planes[k, 5]
@@ -69,12 +93,40 @@ def wall_hit(ox, oy, oz, dx, dy, dz, walls):
                 t = (math.sqrt(root) - b) / a
                 if t < nearest:
                     nearest, wall = t, walls.cylinder_number[k]
+    patches = walls.patches
+    # Without the call where there are none: its arrays are reference-counted at every ray.
+    if patches.disc_number.size + patches.cone_number.size + patches.triangle_number.size > 0:
+        nearest, number = patch_hit(ox, oy, oz, dx, dy, dz, nearest, patches)
+        if number >= 0:
+            wall = number
     return nearest, wall
 
 
 @njit(**_OPTIONS)
+def wall_hit(ox, oy, oz, dx, dy, dz, walls):
+    """Nearest wall ahead: distance (inf where none) and its number in the packing (-1)."""
+    return wall_hit_within(ox, oy, oz, dx, dy, dz, np.inf, walls)
+
+
+@njit(**_OPTIONS)
+def walls_ahead(m, pending, rays, centre, walls, bound, wall):
+    """Nearest wall of ``m`` rays, where it is nearer than their ``bound`` [m], which it lowers.
+
+    ``rays`` (6, n) holds directions and starts relative to ``centre`` [m].
+    """
+    for q in range(m):
+        k = pending[q]
+        t, number = wall_hit_within(
+            centre[0] + rays[3, k], centre[1] + rays[4, k], centre[2] + rays[5, k],
+            rays[0, k], rays[1, k], rays[2, k], bound[q], walls,
+        )  # fmt: skip
+        if number >= 0:
+            bound[q], wall[q] = t, number
+
+
+@njit(**_OPTIONS)
 def behind(x, y, z, walls):
-    """Whether a point lies behind a wall, that is not on the bed's side of it."""
+    """Whether a point lies behind an unbounded wall, that is not on the bed's side of it."""
     planes, cylinders = walls.planes, walls.cylinders
     for k in range(planes.shape[0]):
         height = (
@@ -90,3 +142,15 @@ def behind(x, y, z, walls):
         if qx * qx + qy * qy + qz * qz - along * along > cylinders[k, 6] ** 2:
             return True
     return False
+
+
+@njit(**_OPTIONS)
+def crosses(cx, cy, cz, x, y, z, walls):
+    """Whether a bounded wall stands between a sphere's centre and a point of its surface.
+
+    Bounded walls have no back side; so this, and not a half space, says which surface they hide.
+    """
+    dx, dy, dz = x - cx, y - cy, z - cz
+    length = math.sqrt(dx * dx + dy * dy + dz * dz)
+    _, number = patch_hit(cx, cy, cz, dx / length, dy / length, dz / length, length, walls.patches)
+    return number >= 0

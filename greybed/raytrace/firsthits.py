@@ -38,7 +38,7 @@ def first_hits(
     length = np.sqrt((d**2).sum(axis=1, keepdims=True))
     if not (np.isfinite(o).all() and np.isfinite(d).all() and (length > 0.0).all()):
         raise InputError("origins and directions must be finite, directions longer than zero.")
-    scene = Scene.of(packing)
+    scene = Scene.of(packing).tables
     distance, owner = np.empty(len(o)), np.empty(len(o), np.int64)
     _kernels.first_hits(o, d / length, scene.grid, scene.walls, distance, owner)
     return distance, owner

@@ -13,13 +13,19 @@ from numpy.typing import ArrayLike, NDArray
 from greybed.core import InputError, Packing
 from greybed.core.processors import available_threads
 from greybed.core.progress import progress
-from greybed.raytrace import _kernels
+from greybed.raytrace import _bundle, _kernels, _rows, _sobol
+from greybed.raytrace.arguments import sphere_numbers, whole_number
 from greybed.raytrace.scene import Scene
 
-# One task's rays: small enough for its table to stay in cache, and for one sphere's rays to
-# spread over the threads.
-RAYS_PER_TASK = 65_536
+# One task's rays: small enough to stay in cache, and for one sphere's rays to spread over the
+# threads.
+RAYS_PER_TASK = 16_384
 RAYS_PER_BLOCK = 1_000_000
+# Independent scramblings of the sequence, by whose spread errors are known. A replicate grows with
+# the rays, for that is where quasi-random points gain, up to what a task may hold.
+REPLICATES = 16
+LONGEST_REPLICATE = 16_384
+SAMPLINGS = ("sobol", "random")
 # A standard error of 5e-7, and a day's work per emitter; beyond, the list of tasks alone would
 # fill the memory.
 MOST_RAYS = 10**12
@@ -39,8 +45,12 @@ class Tally:
         the packing, or ``ESCAPED``.
     count : (m,) int64
         Rays.
+    squares : (m,) int64
+        Sum of the squares of the replicates' rays.
     rays : int
         Rays of each emitter.
+    replicates : int
+        Parts of near equal size that the rays of an emitter come in, independent of each other.
     buried : (n,) float
         Fraction of each sphere's surface inside other spheres or walls [-]; NaN if not traced.
     seconds : float
@@ -50,7 +60,9 @@ class Tally:
     emitter: NDArray[np.int64]
     key: NDArray[np.int64]
     count: NDArray[np.int64]
+    squares: NDArray[np.int64]
     rays: int
+    replicates: int
     buried: NDArray[np.float64]
     seconds: float
 
@@ -79,6 +91,7 @@ def trace(
     emitters: ArrayLike | None = None,
     images: bool = False,
     max_distance: float = np.inf,
+    sampling: str = "sobol",
     show_progress: bool = False,
 ) -> Tally:
     """Trace ``rays`` cosine-law rays from each emitter to the first sphere or wall.
@@ -99,128 +112,161 @@ def trace(
         Keep apart the periodic images of a target.
     max_distance : float
         Rays that meet nothing within it count as escaped [m].
+    sampling : str
+        ``sobol``: scrambled quasi-random rays in 16 independent replicates, or more where one
+        would exceed 16,384 rays; ``random``: every ray on its own.
 
     Raises
     ------
     InputError
         For numbers out of range, walls that do not repeat, or a sphere wholly inside others.
     """
-    rays = _whole(rays, "rays", 1, MOST_RAYS)
-    seed = _whole(seed, "seed", 0)
+    rays = whole_number(rays, "rays", 1, MOST_RAYS)
+    seed = whole_number(seed, "seed", 0)
     workers = available_threads()
     if threads is not None:
-        workers = _whole(threads, "threads", 1, MOST_THREADS)
+        workers = whole_number(threads, "threads", 1, MOST_THREADS)
     if not max_distance > 0.0:
         raise InputError(f"max_distance = {max_distance:g} [m] must be above 0.")
+    if sampling not in SAMPLINGS:
+        raise InputError(f"sampling = {sampling!r} is unknown; give one of {', '.join(SAMPLINGS)}.")
     n = len(packing)
-    who = np.arange(n) if emitters is None else np.unique(_numbers(emitters))
+    who = np.arange(n) if emitters is None else np.unique(sphere_numbers(emitters))
     if who[0] < 0 or who[-1] >= n:
         raise InputError(f"emitters must lie in 0 ... {n - 1}; got {who[0]} ... {who[-1]}.")
     begin = time.perf_counter()
-    scene = Scene.of(packing)
-    blocks = list(_blocks(who, rays))
-    emitter, key, count = [], [], []
+    job = _Job.of(Scene.of(packing), rays, seed, sampling, images, max_distance)
+    blocks = list(job.blocks(who))
+    emitter, key, count, square = [], [], [], []
     rejected = np.zeros(n)
     with (
         ThreadPoolExecutor(workers) as pool,
         progress(len(who) * rays, "tracing rays", show=show_progress) as advance,
     ):
-        done = pool.map(
-            lambda tasks: _trace_tasks(scene, tasks, seed, images, max_distance), blocks
-        )
+        done = pool.map(job.run, blocks)
         try:
-            for tasks, (keys, counts, ends, lost) in zip(blocks, done, strict=True):
+            for tasks, (keys, counts, squares, ends, lost) in zip(blocks, done, strict=True):
                 emitter.append(np.repeat(tasks[:, 0], np.diff(ends, prepend=0)))
                 key.append(keys)
                 count.append(counts)
+                square.append(squares)
                 np.add.at(rejected, tasks[:, 0], lost)
-                advance(int((tasks[:, 2] - tasks[:, 1]).sum()))
+                advance(job.rays_of(tasks))
         except BaseException:  # Ctrl-C must not wait for the blocks that have not begun
             pool.shutdown(wait=False, cancel_futures=True)
             raise
     buried = np.full(n, np.nan)
     buried[who] = rejected[who] / (rejected[who] + rays)
-    merged = _merge(np.concatenate(emitter), np.concatenate(key), np.concatenate(count))
-    return Tally(*merged, rays, buried, time.perf_counter() - begin)
+    merged = _merge(*(np.concatenate(parts) for parts in (emitter, key, count, square)))
+    seconds = time.perf_counter() - begin
+    return Tally(*merged, rays, job.replicates, buried, seconds)
 
 
-def _whole(value: int, name: str, least: int, most: int = 2**63 - 1) -> int:
-    if not least <= value <= most or value != int(value):
-        raise InputError(
-            f"{name} = {value!r} must be a whole number of at least {least} and at most {most}; "
-            "mend it."
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """One trace: the scene, and how the rays of an emitter are cut into replicates."""
+
+    scene: Scene
+    offsets: NDArray[np.int64]
+    seed: int
+    quasi: bool
+    points: NDArray[np.uint32]
+    images: bool
+    limit: float
+
+    @classmethod
+    def of(
+        cls, scene: Scene, rays: int, seed: int, sampling: str, images: bool, limit: float
+    ) -> _Job:
+        replicates = min(rays, max(REPLICATES, -(-rays // LONGEST_REPLICATE)))
+        # Near equal parts; of one ray more the first replicates get it.
+        number = np.arange(replicates + 1)
+        offsets = number * (rays // replicates) + np.minimum(number, rays % replicates)
+        longest = int(np.diff(offsets).max())
+        points = np.zeros((_sobol.DIMENSIONS, longest), np.uint32)
+        if sampling == "sobol":
+            _sobol.sequence(longest, _sobol.direction_numbers(), points)
+        return cls(scene, offsets, seed, sampling == "sobol", points, images, limit)
+
+    @property
+    def replicates(self) -> int:
+        return len(self.offsets) - 1
+
+    def rays_of(self, tasks: NDArray[np.int64]) -> int:
+        """Rays of some tasks."""
+        return int((self.offsets[tasks[:, 2]] - self.offsets[tasks[:, 1]]).sum())
+
+    def blocks(self, emitters: NDArray[np.int64]) -> Iterator[NDArray[np.int64]]:
+        """Tasks (sphere, first replicate, last replicate) in blocks worth handing to a thread."""
+        longest = int(self.offsets[1])
+        first = np.arange(0, self.replicates, max(1, RAYS_PER_TASK // longest))
+        last = np.append(first[1:], self.replicates)
+        rays_per_task = int((self.offsets[last] - self.offsets[first]).max())
+        per_block = max(1, RAYS_PER_BLOCK // rays_per_task)
+        tasks = np.stack(
+            [
+                np.repeat(emitters, len(first)),
+                np.tile(first, len(emitters)),
+                np.tile(last, len(emitters)),
+            ],
+            axis=1,
         )
-    return int(value)
+        for begin in range(0, len(tasks), per_block):
+            yield tasks[begin : begin + per_block]
 
-
-def _numbers(emitters: ArrayLike) -> NDArray[np.int64]:
-    given = np.asarray(emitters)
-    if given.size == 0:
-        raise InputError("emitters is empty; leave it out to trace from all spheres.")
-    if given.dtype.kind not in "iu":  # a mask would silently mean the spheres 0 and 1
-        raise InputError(
-            f"emitters of type {given.dtype} must be sphere numbers; for a mask give "
-            "np.flatnonzero(mask)."
-        )
-    return given.astype(np.int64)
-
-
-def _blocks(emitters: NDArray[np.int64], rays: int) -> Iterator[NDArray[np.int64]]:
-    """Tasks (sphere, first ray, last ray) in blocks worth handing to a thread."""
-    first = np.arange(0, rays, RAYS_PER_TASK)
-    last = np.minimum(first + RAYS_PER_TASK, rays)
-    per_block = max(1, RAYS_PER_BLOCK // min(rays, RAYS_PER_TASK))
-    tasks = np.stack(
-        [
-            np.repeat(emitters, len(first)),
-            np.tile(first, len(emitters)),
-            np.tile(last, len(emitters)),
-        ],
-        axis=1,
-    )
-    for begin in range(0, len(tasks), per_block):
-        yield tasks[begin : begin + per_block]
-
-
-def _trace_tasks(
-    scene: Scene, tasks: NDArray[np.int64], seed: int, images: bool, limit: float
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Trace one block, with more room for output whenever it runs full."""
-    most = int((tasks[:, 2] - tasks[:, 1]).max())
-    size = 1 << max(4, (2 * most - 1).bit_length())
-    table = np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size, np.int64)
-    ends = np.zeros(len(tasks), np.int64)
-    lost = np.zeros(len(tasks), np.int64)
-    room = len(tasks) * min(most, 512)
-    packing = scene.packing
-    while True:
-        keys, counts = np.empty(room, np.int64), np.empty(room, np.int64)
-        done = _kernels.trace_block(
-            tasks, seed, packing.centres, packing.radii, scene.exposed, images, scene.grid,
-            scene.walls, limit, *table, keys, counts, ends, lost,
-        )  # fmt: skip
-        if done == len(tasks):
-            break
-        room *= 2
-    if (lost < 0).any():
-        i = int(tasks[(lost < 0).argmax(), 0])
-        raise InputError(
-            f"{packing.source}: sphere {i} lies wholly inside other spheres or walls (no exposed "
-            f"surface in {_kernels.MAX_ATTEMPTS} attempts); remove it or its duplicate."
-        )
-    keys, counts = keys[: ends[-1]].copy(), counts[: ends[-1]].copy()
-    return keys, counts, ends, lost
+    def run(
+        self, tasks: NDArray[np.int64]
+    ) -> tuple[
+        NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64],
+        NDArray[np.int64],
+    ]:  # fmt: skip
+        """Trace one block; what does not fit into the output is traced in a second go."""
+        sizes = self.offsets[tasks[:, 2]] - self.offsets[tasks[:, 1]]
+        most, widest = int(sizes.max()), int((tasks[:, 2] - tasks[:, 1]).max())
+        ends = np.zeros(len(tasks), np.int64)
+        lost = np.zeros(len(tasks), np.int64)
+        # One task fits always, and so each go does at least one.
+        room = max(len(tasks) * min(most, 512), most + _bundle.MOST)
+        packing = self.scene.packing
+        output = np.empty((3, room), np.int64)
+        parts = []
+        done = 0
+        while done < len(tasks):
+            more = _rows.trace_block(
+                tasks[done:], self.offsets, self.seed, self.quasi, self.points, self.images,
+                self.scene.tables, self.limit, most, widest, *output, ends[done:], lost[done:],
+            )  # fmt: skip
+            used = int(ends[done + more - 1])
+            parts.append(output[:, :used].copy())
+            ends[done : done + more] += sum(part.shape[1] for part in parts[:-1])
+            done += more
+        if (lost < 0).any():
+            i = int(tasks[(lost < 0).argmax(), 0])
+            raise InputError(
+                f"{packing.source}: sphere {i} lies wholly inside other spheres or walls (no "
+                f"exposed surface in {_kernels.MAX_ATTEMPTS} attempts); remove it or its duplicate."
+            )
+        keys, counts, squares = np.concatenate(parts, axis=1)
+        return keys, counts, squares, ends, lost
 
 
 def _merge(
-    emitter: NDArray[np.int64], key: NDArray[np.int64], count: NDArray[np.int64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Sum the counts of equal (emitter, key), sorted."""
+    emitter: NDArray[np.int64],
+    key: NDArray[np.int64],
+    count: NDArray[np.int64],
+    squares: NDArray[np.int64],
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Sum the counts, and the squares, of equal (emitter, key), sorted."""
     if (np.diff(emitter, prepend=-1)[np.diff(key, prepend=key[0]) <= 0] > 0).all():
-        return emitter, key, count  # one task per sphere: each task's tallies are in key order
+        return emitter, key, count, squares  # one task per sphere: tallies are in key order
     order = np.lexsort((key, emitter))
-    emitter, key, count = emitter[order], key[order], count[order]
+    emitter, key, count, squares = emitter[order], key[order], count[order], squares[order]
     new = np.ones(len(key), dtype=bool)
     new[1:] = (np.diff(emitter) != 0) | (np.diff(key) != 0)
     begin = np.flatnonzero(new)
-    return emitter[begin], key[begin], np.add.reduceat(count, begin)
+    return (
+        emitter[begin],
+        key[begin],
+        np.add.reduceat(count, begin),
+        np.add.reduceat(squares, begin),
+    )

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
-from greybed.core import Packing
+from greybed.core import InputError, Packing
 from greybed.raytrace import _kernels, tally
+from greybed.raytrace.errors import sequence_error, standard_error
+from greybed.raytrace.smoothing import smoothed
 
 Array = NDArray[np.float64]
 
@@ -27,19 +29,23 @@ class ViewFactors:
         Standard errors of ``factors`` [-], same pattern.
     wall_factors, wall_stderr : ndarray, shape (n, n_walls)
         Sphere to wall, in the order of ``packing.walls`` [-].
-    escaped : ndarray, shape (n,)
-        Fraction that meets nothing [-].
+    escaped, escaped_stderr : ndarray, shape (n,)
+        Fraction that meets nothing, and its standard error [-].
     buried : ndarray, shape (n,)
         Fraction of the surface inside other spheres or walls [-]. Rays start on the rest.
     areas : ndarray, shape (n,)
         Exposed surface 4 pi r^2 (1 - buried) [m2]: with it ``A_i F_ij = A_j F_ji`` holds within
         the errors.
     rays : int
-        Rays per sphere [-].
+        Rays per sphere, at least [-].
     seed : int
         Seed of the random streams.
     seconds : float
         Wall time [s].
+    cost : ndarray of int, shape (n,)
+        Rays and lines that each row cost; a pair's lines count half for either sphere [-].
+    reciprocal : bool
+        Whether both directions of each pair are one estimate already.
     """
 
     factors: sparse.csr_array
@@ -47,33 +53,28 @@ class ViewFactors:
     wall_factors: Array
     wall_stderr: Array
     escaped: Array
+    escaped_stderr: Array
     buried: Array
     areas: Array
     rays: int
     seed: int
     seconds: float
-
-
-def standard_error(count: ArrayLike, rays: ArrayLike) -> Array:
-    """Standard error of a hit fraction ``count / rays`` [-].
-
-    The binomial error after two more hits and two more misses (Agresti & Coull 1998,
-    doi 10.1080/00031305.1998.10480550). It tends to sqrt(p (1 - p) / N) for large counts and,
-    unlike it, stays honest for small ones: intervals of 1.96 errors hold the truth in 95 % of
-    the cases from three expected hits up, and no hit does not claim certainty.
-    """
-    k, n = np.asarray(count, dtype=np.float64), np.asarray(rays, dtype=np.float64)
-    return np.sqrt((k + 2.0) * (n - k + 2.0) / (n + 4.0)) / (n + 4.0)
+    cost: NDArray[np.int64]
+    reciprocal: bool = False
 
 
 def view_factors(
     packing: Packing,
     *,
     rays: int = 10_000,
+    rel_error: float | None = None,
+    least: float = 1e-3,
     seed: int = 0,
     threads: int | None = None,
     emitters: ArrayLike | None = None,
     max_distance: float = np.inf,
+    sampling: str = "sobol",
+    smooth: bool = False,
     show_progress: bool = False,
 ) -> ViewFactors:
     """Trace the view factors of a packing.
@@ -88,6 +89,12 @@ def view_factors(
         Spheres of any sizes, open or periodic, with planes and cylinders as walls.
     rays : int
         Rays per sphere, at least 1 [-].
+    rel_error : float, optional
+        Relative standard error wanted of every factor of ``least`` or more, above 0 [-]. Rows
+        are traced with ``rays`` rays first; then pairs one by one, and rows once more where walls,
+        opening or overlapping pairs need it (see :mod:`greybed.raytrace.adaptive`).
+    least : float
+        Smallest factor that ``rel_error`` holds for, between 0 and 1 [-].
     seed : int
         Seed, at least 0.
     threads : int, optional
@@ -96,6 +103,11 @@ def view_factors(
         Trace only from these spheres; the other rows are empty (walls, escape: NaN).
     max_distance : float
         Rays that meet nothing within it count as escaped [m].
+    sampling : {"sobol", "random"}
+        Scrambled quasi-random rays, or independent ones.
+    smooth : bool
+        Make the factors reciprocal and the rows add up to one, see
+        :func:`greybed.raytrace.smoothed`.
     show_progress : bool
         Draw a progress bar on standard error.
 
@@ -121,6 +133,16 @@ def view_factors(
     >>> bool(abs(result.factors[0, 1] - 0.0755868) < 4 * result.stderr[0, 1])
     True
     """
+    if rel_error is not None:
+        from greybed.raytrace.adaptive import refined
+
+        if emitters is not None:
+            raise InputError("rel_error refines all rows; leave out emitters, or give rays.")
+        result = refined(
+            packing, rel_error, least, rays=rays, seed=seed, threads=threads,
+            max_distance=max_distance, show_progress=show_progress,
+        )  # fmt: skip
+        return smoothed(result) if smooth else result
     counts = tally.trace(
         packing,
         rays=rays,
@@ -128,8 +150,15 @@ def view_factors(
         threads=threads,
         emitters=emitters,
         max_distance=max_distance,
+        sampling=sampling,
         show_progress=show_progress,
     )
+    if sampling == "sobol":
+        error = sequence_error(
+            counts.emitter, counts.count, counts.squares, counts.rays, counts.replicates
+        )
+    else:
+        error = standard_error(counts.count, counts.rays)
     n = len(packing)
     traced = np.isfinite(counts.buried)
     to_sphere = counts.key >= 0
@@ -138,22 +167,29 @@ def view_factors(
     hits = counts.count[to_sphere]
     shape = (n, n)
     factors = sparse.csr_array((hits / counts.rays, index, start), shape=shape)
-    errors = sparse.csr_array((standard_error(hits, counts.rays), index, start), shape=shape)
+    errors = sparse.csr_array((error[to_sphere], index, start), shape=shape)
     walls = np.where(traced[:, None], 0.0, np.full((n, packing.n_walls), np.nan))
     escaped = np.where(traced, 0.0, np.nan)
     lost = counts.key == _kernels.ESCAPED
     escaped[counts.emitter[lost]] = counts.count[lost] / counts.rays
     at_wall = (counts.key < 0) & ~lost
     walls[counts.emitter[at_wall], -1 - counts.key[at_wall]] = counts.count[at_wall] / counts.rays
-    return ViewFactors(
+    wall_errors = np.where(traced[:, None], standard_error(0, counts.rays), walls)
+    wall_errors[counts.emitter[at_wall], -1 - counts.key[at_wall]] = error[at_wall]
+    escape_errors = np.where(traced, standard_error(0, counts.rays), np.nan)
+    escape_errors[counts.emitter[lost]] = error[lost]
+    result = ViewFactors(
         factors=factors,
         stderr=errors,
         wall_factors=walls,
-        wall_stderr=standard_error(walls * counts.rays, counts.rays),
+        wall_stderr=wall_errors,
         escaped=escaped,
+        escaped_stderr=escape_errors,
         buried=counts.buried,
         areas=packing.areas * (1.0 - counts.buried),
         rays=counts.rays,
         seed=seed,
         seconds=counts.seconds,
+        cost=np.where(traced, counts.rays, 0),
     )
+    return smoothed(result) if smooth else result

@@ -10,6 +10,8 @@ from scipy.sparse import csr_matrix
 
 from greybed import closures, raytrace
 from greybed.cli import main
+from greybed.core import Cone, Cylinder, Disc, InputError, Mesh
+from greybed.coupling.case import load_case
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "heated_bed" / "case.toml"
 
@@ -36,6 +38,33 @@ heat_capacity = "0.5 kJ/kg/K"
 emissivity = 0.8
 [radiation]
 source = "off"
+"""
+
+BOUNDED = """
+kind = "thermal-bed"
+packing.file = "bed.csv"
+opening.temperature = 300
+radiation.source = "off"
+material = {conductivity = 15.0, density = 7900.0, heat_capacity = 500.0}
+[[wall]]
+name = "floor"
+kind = "disc"
+normal = [0, 0, 2]
+radius = 9e-3
+temperature = 500
+[[wall]]
+name = "hopper"
+kind = "cone"
+radius = 9e-3
+end_radius = "20 mm"
+length = 9e-3
+temperature = 500
+[[wall]]
+name = "tube"
+kind = "cylinder"
+radius = "20 mm"
+length = 9e-3
+heat = "adiabatic"
 """
 
 
@@ -183,6 +212,36 @@ def test_opening_is_needed_where_rays_leave_and_noted_where_none_do(
     text = text.replace('"traced"', '"traced"\nrays = 200')
     assert simulate(case(text), tmp_path / "out")[0] == 0
     assert "note: no sphere sees the opening" in capsys.readouterr().out
+
+
+LID = "v -9 -9 2\nv 9 -9 2\nv 9 9 2\nv -9 9 2\ng a\nf 1 2 3\ng b\nf 1 3 4\n"
+LID_TABLE = """[[wall]]
+kind = "mesh"
+name = "lid"
+file = "lid.obj"
+unit = "mm"
+temperature = 400
+"""
+
+
+def test_bounded_walls_of_a_case(case, tmp_path):
+    (tmp_path / "lid.obj").write_text(LID)
+    path = case(BOUNDED + LID_TABLE)
+    corners = np.array([[-9, -9, 2], [9, -9, 2], [9, 9, 2], [-9, 9, 2]]) * 1e-3
+    assert load_case(path).walls == (
+        Disc((0, 0, 0), (0, 0, 1), 9e-3, "floor"),
+        Cone((0, 0, 0), (0, 0, 1), 9e-3, 0.02, 9e-3, "hopper"),
+        Cylinder((0, 0, 0), (0, 0, 1), 0.02, "tube", 9e-3),
+        Mesh(corners, [[0, 1, 2], [0, 2, 3]], "lid"),
+    )
+    code, summary = simulate(path, tmp_path / "out")
+    assert code == 0
+    # The lid touches the second sphere from below and cools it.
+    assert 400.0 < summary["lowest_temperature_K"] < 500.0
+    assert set(summary["provenance"]["inputs"]) == {"case.toml", "bed.csv", "lid.obj"}
+    (tmp_path / "lid.obj").unlink()
+    with pytest.raises(InputError, match="no such file"):
+        _ = load_case(path).walls
 
 
 def test_threads_below_one_are_refused(case, tmp_path, capsys):

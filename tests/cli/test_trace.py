@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from greybed.cli.main import main
-from greybed.cli.trace import STATE, parse_wall
-from greybed.core import Cylinder, InputError, Packing, Plane
+from greybed.cli.trace import STATE, parse_walls
+from greybed.core import Cone, Cylinder, Disc, InputError, Packing, Plane, Polygon, box_walls
 from greybed.core.writers import write_packing
 from greybed.datasets.factors_file import read_factors
 from greybed.datasets.generate import random_packing
@@ -160,14 +160,81 @@ def test_summary_walls_and_overlaps(tmp_path, capsys):
     assert stored.wall_names == ("plane_1", "cylinder_2")
 
 
-def test_walls_as_they_are_typed():
-    assert parse_wall("plane:0,0,-1mm:0,0,2", "a") == Plane((0, 0, -1e-3), (0, 0, 1), "a")
-    pipe = parse_wall("cylinder:0,0,0:1,0,0:30mm", "b")
-    assert isinstance(pipe, Cylinder)
-    assert math.isclose(pipe.radius, 0.03)
-    for text in ("plane:0,0,0", "cylinder:0,0,0:0,0,1", "cone:0,0,0:0,0,1", "plane:0,0:0,0,1", ""):
-        with pytest.raises(InputError, match="give plane:X,Y,Z:NX,NY,NZ or cylinder"):
-            parse_wall(text, "c")
+def test_walls_as_they_are_typed(tmp_path):
+    up = ((0, 0, 0), (0, 0, 1))
+    for text, wall in (
+        ("plane:0,0,-1mm:0,0,2", Plane((0, 0, -1e-3), (0, 0, 1), "a")),
+        ("cylinder:0,0,0:0,0,1:0.03", Cylinder(*up, 0.03, "a")),
+        ("cylinder:0,0,0:0,0,1:0.03:50cm", Cylinder(*up, 0.03, "a", 0.5)),
+        ("cone:0,0,0:0,0,1:0:0.03:2", Cone(*up, 0.0, 0.03, 2.0, "a")),
+        ("disc:0,0,0:0,0,1:0.03", Disc(*up, 0.03, "a")),
+        (
+            "polygon:0,0,0:1,0,0:1,1,0:0,100cm,0",
+            Polygon([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], "a"),
+        ),
+    ):
+        assert parse_walls(text, "a") == (wall,)
+    assert parse_walls("box:0,0,0:1,2,300cm", "b") == box_walls((0, 0, 0), (1, 2, 3), "b")
+    path = tmp_path / "c:d.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    assert parse_walls(f"mesh:{path}", "c")[0].area == 0.5
+    (mesh,) = parse_walls(f"mesh:{path}:mm", "c")
+    assert (mesh.name, math.isclose(mesh.area, 0.5e-6)) == ("c", True)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("plane:0,0,0", "give plane:X,Y,Z:NX,NY,NZ, such as plane:0,0,0:0,0,1"),
+        ("plane:0,0:0,0,1", "give plane:"),
+        ("cylinder:0,0,0:0,0,1", "give cylinder:"),
+        ("cone:0,0,0:0,0,1", "give cone:"),
+        ("disc:0,0,0:0,0,1:1:1", "give disc:"),
+        ("box:0,0,0", "give box:"),
+        ("polygon:0,0,0:1,0,0", "give polygon:"),
+        ("mesh:", "give mesh:FILE"),
+        ("mesh:none.stl:mm", "no such file"),
+        ("torus:0,0,0", "give plane:.* or mesh:FILE"),
+        ("", "give plane:"),
+    ],
+)
+def test_walls_mistyped(text, says):
+    with pytest.raises(InputError, match=says):
+        parse_walls(text, "c")
+
+
+def test_trace_in_a_box_of_walls(tmp_path):
+    bed = Packing([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5]], 0.3)
+    write_packing(bed, tmp_path / "bed.csv")
+    words = [
+        "trace",
+        str(tmp_path / "bed.csv"),
+        "--rays",
+        "500",
+        "--quiet",
+        "--out",
+        str(tmp_path / "o"),
+    ]
+    assert main([*words, "--wall", "box:0,0,0:2,1,1", "--wall", "disc:1,0.5,0.5:1,0,0:0.1"]) == 0
+    stored = read_factors(tmp_path / "o/view_factors.h5")
+    assert stored.wall_names[0] == "box_1_x_low"
+    assert stored.wall_names[-1] == "disc_2"
+    assert (stored.result.escaped == 0.0).all()
+    stored.check(
+        Packing(
+            bed.centres,
+            bed.radii,
+            walls=[*box_walls((0, 0, 0), (2, 1, 1)), Disc((1, 0.5, 0.5), (1, 0, 0), 0.1)],
+        )
+    )
+    with pytest.raises(InputError, match="another packing"):
+        stored.check(
+            Packing(
+                bed.centres,
+                bed.radii,
+                walls=[*box_walls((0, 0, 0), (2, 1, 1)), Disc((1, 0.5, 0.5), (1, 0, 0), 0.2)],
+            )
+        )
 
 
 @pytest.mark.parametrize(

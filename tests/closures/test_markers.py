@@ -7,7 +7,7 @@ from greybed.closures.viewfactor import exact_view_factor, neighbourhood, pair_m
 from greybed.closures.viewfactor.bed import bed_factors, inner_fraction
 from greybed.closures.viewfactor.closure import ViewFactorClosure
 from greybed.closures.viewfactor.markers import pencil_lines
-from greybed.core import Packing, Plane
+from greybed.core import Packing, Plane, box_walls
 from greybed.datasets.generate import random_packing
 from greybed.datasets.lattices import lattice
 from greybed.datasets.sizes import LogNormal
@@ -136,6 +136,23 @@ def test_walls_take_what_the_rows_leave():
     assert a.escaped[lowest] == pytest.approx(
         b.escaped[lowest] + b.wall_factors[lowest, 0], abs=1e-3
     )
+
+
+def test_bounded_walls_take_as_much_as_unbounded_ones():
+    packing = random_packing(200, 0.5, LogNormal(1.0, 1.2), seed=1)
+    # Some spheres stick a little way through the walls.
+    room = 0.9 * packing.radii.max()
+    low, high = packing.centres.min() - room, packing.centres.max() + room
+    sides = [Plane((low,) * 3, axis) for axis in np.eye(3)]
+    sides += [Plane((high,) * 3, -axis) for axis in np.eye(3)]
+    box = box_walls((low,) * 3, (high,) * 3)
+    closure = ViewFactorClosure.untrained()
+    a, b = (
+        bed_factors(closure, Packing(packing.centres, packing.radii, walls=walls))
+        for walls in (sides, box)
+    )
+    assert b.escaped.max() < 1e-12
+    np.testing.assert_allclose(b.wall_factors, a.wall_factors[:, [0, 3, 1, 4, 2, 5]], atol=1e-12)
 
 
 def test_inner_fraction_of_a_known_bed():

@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 from greybed.core.errors import InputError
 from greybed.core.packing import Packing
 from greybed.core.readers import read_packing
-from greybed.core.walls import Cylinder, Plane
+from greybed.core.walls import Cone, Cylinder, Disc, Mesh, Plane, box_walls
 from greybed.core.writers import write_packing
 
 WALLS = (
@@ -118,8 +118,8 @@ def _huge(root):
         (lambda root: root.attrs.modify("walls", "[" * 10**4), r"attribute walls cannot be read"),
         (lambda root: root.attrs.modify("walls", "3"), r"attribute walls cannot be read"),
         (
-            lambda root: root.attrs.modify("walls", json.dumps([{"kind": "cone", "name": "a"}])),
-            r"attribute walls .*'cone' is neither plane nor cylinder",
+            lambda root: root.attrs.modify("walls", json.dumps([{"kind": "torus", "name": "a"}])),
+            r"attribute walls .*'torus' is none of plane",
         ),
         (lambda root: _replace(root, "radii", [0.1]), r"2 centres and 1 radii; .*write"),
         (lambda root: _replace(root, "radii", [0.1, -1.0]), r"row 2: radius = -1 \[m\] must"),
@@ -155,4 +155,33 @@ def test_a_flipped_bit_is_noticed(path):
     content[at] ^= 1
     path.write_bytes(content)
     with pytest.raises(InputError, match=r"cut or damaged"):
+        read_packing(path)
+
+
+def test_bounded_walls_come_back(tmp_path):
+    """Also more of them than an attribute of old holds, and meshes with what they said."""
+    rng = np.random.default_rng(1)
+    mesh = Mesh(rng.uniform(size=(30, 3)), [*np.arange(30).reshape(-1, 3), [0, 0, 1]], "m")
+    assert mesh.dropped == 1
+    round_ones = ((0.1, 0.2, 0.3), (0.3, 0.1, 1.0))
+    walls = (
+        mesh,
+        Cylinder(*round_ones, 0.7, "tube", 0.3),
+        Cone(*round_ones, 0.7, 0.1, 0.3, "cone"),
+        Disc(*round_ones, 0.7, "disc"),
+        *(w for k in range(200) for w in box_walls((0, 0, 0), rng.uniform(1, 2, 3), f"box {k}")),
+        mesh.flipped(),
+    )
+    path = write_packing(Packing([[0.1, 0.2, 0.3]], 0.1, walls=walls), tmp_path / "bed.h5")
+    again = read_packing(path).walls
+    assert again == walls
+    assert (again[0].dropped, again[0].watertight) == (1, False)
+    assert [w.area for w in again] == [w.area for w in walls]
+    with h5py.File(path, "r+") as root:
+        root["wall_0_vertices"][3, 1] += 1e-9
+    with pytest.raises(InputError, match="'m': corners or faces are not those"):
+        read_packing(path)
+    with h5py.File(path, "r+") as root:
+        del root["wall_0_faces"]
+    with pytest.raises(InputError, match="no dataset 'wall_0_faces'"):
         read_packing(path)

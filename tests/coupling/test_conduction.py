@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipe, ellipk
 
-from greybed.core import Cylinder, InputError, Packing, Plane
+from greybed.core import Cone, Cylinder, Disc, InputError, Packing, Plane, box_walls
 from greybed.coupling import contact_conductances
 from greybed.coupling.conduction import wall_contacts
 
@@ -92,3 +92,35 @@ def test_sphere_behind_a_wall_is_refused():
         contact_conductances(
             Packing([[0, 0, 0]], R, walls=[Cylinder((0, 0, 0), (0, 0, 1), R / 2)]), K
         )
+
+
+def test_bounded_walls_touch_as_unbounded_ones_do():
+    centres, up = [[0.2, 0.3, 0.95], [0.0, -2.02, 2.0]], (0, 0, 1)
+    bed = Packing(centres, 1.0)
+    plane, flat = (
+        Plane((0, 0, 0), up),
+        (Disc((0, 0, 0), up, 9.0), box_walls((-9,) * 3, (9, 9, 0))[5]),
+    )
+    for wall in flat:
+        for got, want in zip(wall_contacts(bed, wall), wall_contacts(bed, plane), strict=True):
+            np.testing.assert_allclose(got, want, rtol=1e-12)
+    pipe = Cylinder((0, 0, -5), up, 3.0)
+    for wall in (Cylinder((0, 0, -5), up, 3.0, length=20), Cone((0, 0, -5), up, 3.0, 3.0, 20)):
+        for got, want in zip(wall_contacts(bed, wall), wall_contacts(bed, pipe), strict=True):
+            np.testing.assert_allclose(got, want, rtol=1e-12)
+
+
+def test_curvature_of_cones_and_of_the_outside_of_tubes():
+    # Outside: 1/R* is the mean of the sphere's 1/r and of 1/r + 1/R.
+    outside = Packing([[3.99, 0, 0]], 1.0, walls=[Cylinder((0, 0, -5), (0, 0, 1), 3.0, length=10)])
+    overlap, effective = wall_contacts(outside, outside.walls[0])
+    assert overlap[0] == pytest.approx(0.01)
+    assert effective[0] == pytest.approx((1.0 * (1.0 + 1 / 3)) ** -0.5)
+    # A cone of half angle 45 degrees: the normal from the wall meets the axis after sqrt(2) rho.
+    cone = Cone((0, 0, 0), (0, 0, 1), 0.0, 10.0, 10.0)
+    middle = np.array([4.0, 0, 4.0]) + 0.99 * np.array([-1, 0, 1]) / 2**0.5
+    overlap, effective = wall_contacts(Packing([middle], 1.0), cone)
+    assert overlap[0] == pytest.approx(0.01)
+    assert effective[0] == pytest.approx((1.0 * (1.0 - 1 / (4.0 * 2**0.5))) ** -0.5)
+    with pytest.raises(InputError, match="does not fit"):
+        wall_contacts(Packing([[0, 0, 5]], 4.0), Cylinder((0, 0, 0), (0, 0, 1), 3.0, length=10))

@@ -129,8 +129,8 @@ def test_foreign_files_are_refused(packing, result, tmp_path):
         read_factors(tmp_path / "absent.h5")
     path = write_factors(tmp_path / "a.h5", packing, result)
     with h5py.File(path, "a") as root:
-        root.attrs["version"] = 2
-    with pytest.raises(InputError, match=r"version = '2' .* newer greybed"):
+        root.attrs["version"] = 3
+    with pytest.raises(InputError, match=r"version = '3' .* newer greybed"):
         read_factors(path)
 
 

@@ -21,7 +21,9 @@ from numpy.typing import NDArray
 from greybed.closures.viewfactor import _kernels
 from greybed.closures.viewfactor.markers import RIM, golden_steps
 from greybed.closures.viewfactor.neighbourhood import Neighbourhood
-from greybed.core import Cylinder, InputError, Packing, Plane, Wall
+from greybed.closures.viewfactor.patches import sphere_to_polygon
+from greybed.core import Cylinder, Packing, Plane, Polygon, Wall
+from greybed.core.patches import bounded, distances, ray_distances
 
 Array = NDArray[np.float64]
 
@@ -121,7 +123,7 @@ def free_shares(packing: Packing, emitters: NDArray[np.int64]) -> Array | None:
     """
     walls, c = packing.walls, packing.centres[emitters]
     planes = [w for w in walls if isinstance(w, Plane)]
-    cylinders = [w for w in walls if isinstance(w, Cylinder)]
+    cylinders = [w for w in walls if isinstance(w, Cylinder) and not bounded(w)]
     if len(planes) + len(cylinders) != len(walls) or len(cylinders) > 1:
         return None
     normals = [np.array(w.normal) for w in planes]
@@ -201,6 +203,7 @@ def wall_markers(
     who, n_walls = hood.emitters, packing.n_walls
     lines = np.zeros((len(who), n_walls + 1))
     seen = np.zeros((len(who), n_walls + 1))
+    hidden = np.zeros((len(who), n_walls), bool)  # a wall behind another one
     r = packing.radii
     chord = 4.0 * (1.0 - solid_fraction) * (r**3).sum() / (r**2).sum() / (3.0 * solid_fraction)
     low = (packing.centres - r[:, None]).min(axis=0)
@@ -215,10 +218,19 @@ def wall_markers(
         origin = packing.centres[index][:, None, :] + offsets
         length = np.full(directions.shape[:2], np.inf)
         hit = np.full(directions.shape[:2], n_walls)
+        met = np.zeros((*directions.shape[:2], n_walls), bool)
         for w, wall in enumerate(packing.walls):
             t = distance_to_wall(origin, directions, wall)
+            if bounded(wall):
+                # As behind a plane: what starts beyond the wall has met it.
+                middle = np.broadcast_to(packing.centres[index][:, None, :], offsets.shape)
+                out = distance_to_wall(middle, offsets / r[index][:, None, None], wall)
+                t[out < r[index][:, None]] = 0.0
+            met[..., w] = np.isfinite(t)
             nearer = t < length
             length, hit = np.where(nearer, t, length), np.where(nearer, w, hit)
+        met &= (hit[..., None] != np.arange(n_walls)) & (length[..., None] > 0.0)
+        hidden[block] = met.any(axis=1)
         through = np.empty(directions.shape[:2])
         _kernels.free_lines(
             index, hood.vector, near_radii, hood.start[block.start : block.stop + 1], directions,
@@ -239,10 +251,14 @@ def wall_markers(
     with ThreadPoolExecutor(threads or available_threads()) as pool:
         list(pool.map(some, range(0, len(who), BLOCK)))
     exact = free_shares(packing, who)
-    share = lines[:, :n_walls] if exact is None else exact
+    share = lines[:, :n_walls].copy() if exact is None else exact
+    for w, wall in enumerate(packing.walls):
+        if exact is None and isinstance(wall, Polygon):
+            alone = sphere_to_polygon(packing.centres[who], wall.vertices)
+            share[:, w] = np.where(hidden[:, w], share[:, w], alone)
     with np.errstate(divide="ignore", invalid="ignore"):
         free = np.where(lines > 0.0, seen / lines, 1.0)
-    rest = lines[:, n_walls] if exact is None else np.clip(1.0 - share.sum(axis=1), 0.0, 1.0)
+    rest = np.clip(1.0 - share.sum(axis=1), 0.0, 1.0)
     distance = np.stack([wall_distance(packing, w, who) for w in packing.walls], axis=1) \
         if n_walls else np.zeros((len(who), 0))  # fmt: skip
     return WallMarkers(
@@ -256,14 +272,13 @@ def wall_markers(
 
 def wall_distance(packing: Packing, wall: Wall, emitters: NDArray[np.int64]) -> Array:
     """Distance of centres from a wall, at least their radius, shape (e,) [m]."""
-    away = packing.centres[emitters] - np.array(wall.point)
     if isinstance(wall, Plane):
-        height = away @ np.array(wall.normal)
-    elif isinstance(wall, Cylinder):
-        axis = np.array(wall.axis)
+        height = (packing.centres[emitters] - np.array(wall.point)) @ np.array(wall.normal)
+    elif isinstance(wall, Cylinder) and not bounded(wall):
+        away, axis = packing.centres[emitters] - np.array(wall.point), np.array(wall.axis)
         height = wall.radius - np.sqrt(((away - np.outer(away @ axis, axis)) ** 2).sum(axis=1))
     else:
-        raise InputError(f"wall {wall.name!r} is of a kind that closures do not know; trace rays.")
+        height = distances([wall], packing.centres[emitters])
     return np.maximum(height, packing.radii[emitters])
 
 
@@ -298,10 +313,9 @@ def distance_to_wall(origin: Array, d: Array, wall: Wall) -> Array:
             towards = d @ normal
             t = np.maximum(-((origin - np.array(wall.point)) @ normal) / towards, 0.0)
             return np.where(towards < 0.0, t, np.inf)
-        if not isinstance(wall, Cylinder):
-            raise InputError(
-                f"wall {wall.name!r} is of a kind that closures do not know; trace rays instead."
-            )
+        if not isinstance(wall, Cylinder) or bounded(wall):
+            flat = ray_distances(wall, origin.reshape(-1, 3), d.reshape(-1, 3))
+            return flat.reshape(d.shape[:-1])
         axis = np.array(wall.axis)
         offset = origin - np.array(wall.point)
         u = d - (d @ axis)[..., None] * axis

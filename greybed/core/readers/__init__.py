@@ -12,10 +12,11 @@ from greybed.core.errors import InputError
 from greybed.core.packing import Packing
 from greybed.core.readers import dump, hdf5, table, vtk
 from greybed.core.readers.assembling import Options
+from greybed.core.readers.mesh import read_mesh
 from greybed.core.readers.opening import mapped, shown
 from greybed.core.walls import Wall
 
-__all__ = ["FORMATS", "file_format", "read_packing"]
+__all__ = ["FORMATS", "file_format", "read_mesh", "read_packing"]
 
 # format -> (what a message calls it, the extensions that announce it)
 FORMATS = {

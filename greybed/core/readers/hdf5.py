@@ -12,8 +12,9 @@ from greybed.core.errors import GreybedError, InputError
 from greybed.core.packing import Array, Packing
 from greybed.core.readers.assembling import Options, assemble
 from greybed.core.readers.opening import listed, shown
+from greybed.core.records import wall_of
 from greybed.core.units import to_si
-from greybed.core.walls import Cylinder, Plane, Wall
+from greybed.core.walls import Wall
 
 FORMAT = "greybed-packing"
 VERSION = 1
@@ -27,29 +28,21 @@ def _text(owner: Any, name: str, default: str = "") -> str:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
-def _exact(wall: Wall, name: str, stored: Any) -> None:
-    """Put back the stored unit vector: scaling it to length 1 again may move its last digit."""
-    vector = (float(stored[0]), float(stored[1]), float(stored[2]))
-    if np.allclose(vector, getattr(wall, name), rtol=0.0, atol=1e-12):
-        object.__setattr__(wall, name, vector)
-
-
-def _walls(path: Path, text: str) -> tuple[Wall, ...]:
+def _walls(path: Path, root: Any) -> tuple[Wall, ...]:
     try:
         walls: list[Wall] = []
-        for record in json.loads(text):
-            kind, name = record["kind"], str(record["name"])
-            if kind == "plane":
-                wall: Wall = Plane(record["point"], record["normal"], name)
-                _exact(wall, "normal", record["normal"])
-            elif kind == "cylinder":
-                radius = float(record["radius"])
-                wall = Cylinder(record["point"], record["axis"], radius, name)
-                _exact(wall, "axis", record["axis"])
-            else:
-                raise InputError(f"kind {shown(str(kind))} is neither plane nor cylinder")
-            walls.append(wall)
+        for k, parts in enumerate(json.loads(_text(root, "walls", "[]"))):
+
+            def arrays(k: int = k) -> tuple[Any, Any]:
+                return (
+                    _dataset(path, root, f"wall_{k}_vertices", (None, 3)),
+                    _stored(path, root, f"wall_{k}_faces", (None, 3))[()],
+                )
+
+            walls.append(wall_of(parts, arrays))
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        if str(error).startswith(f"{path}: "):  # of a mesh's datasets
+            raise
         raise InputError(
             f"{path}: attribute walls cannot be read ({shown(str(error), 80)}); write the file "
             "again with greybed."
@@ -57,8 +50,8 @@ def _walls(path: Path, text: str) -> tuple[Wall, ...]:
     return tuple(walls)
 
 
-def _dataset(path: Path, root: Any, name: str, shape: tuple[int | None, ...]) -> Array:
-    """Read one dataset of lengths [m], with every check before the memory is taken."""
+def _stored(path: Path, root: Any, name: str, shape: tuple[int | None, ...]) -> Any:
+    """One dataset, not read yet, with every check before the memory is taken."""
     import h5py
 
     if name not in root:
@@ -86,6 +79,12 @@ def _dataset(path: Path, root: Any, name: str, shape: tuple[int | None, ...]) ->
             f"{path}: dataset {name!r} states shape {item.shape} but stores {stored} bytes; the "
             "file was cut or damaged: write it again."
         )
+    return item
+
+
+def _dataset(path: Path, root: Any, name: str, shape: tuple[int | None, ...]) -> Array:
+    """Read one dataset of lengths [m]."""
+    item = _stored(path, root, name, shape)
     if "units" not in item.attrs:
         raise InputError(f"{path}: dataset {name!r} has no attribute units; set it to 'm'.")
     return to_si(item[()], _text(item, "units"), "length", f"{path}: dataset {name!r}")
@@ -156,5 +155,5 @@ def _read(path: Path, root: Any, options: Options) -> Packing:
         options,
         box=box,
         periodic=(bool(p[0]), bool(p[1]), bool(p[2])),
-        walls=_walls(path, _text(root, "walls", "[]")),
+        walls=_walls(path, root),
     )

@@ -10,23 +10,12 @@ from numpy.typing import NDArray
 
 from greybed.core.packing import Packing
 from greybed.core.readers.hdf5 import FORMAT, VERSION
-from greybed.core.walls import Plane, Wall
-
-
-def _record(wall: Wall) -> dict[str, object]:
-    if isinstance(wall, Plane):
-        return {"kind": "plane", "name": wall.name, "point": wall.point, "normal": wall.normal}
-    return {
-        "kind": "cylinder",
-        "name": wall.name,
-        "point": wall.point,
-        "axis": wall.axis,
-        "radius": float(wall.radius),
-    }
+from greybed.core.records import record
+from greybed.core.walls import Mesh
 
 
 def write(packing: Packing, path: Path, fields: dict[str, NDArray[np.float64]]) -> None:
-    """Write datasets with units and check sums, and the walls as JSON in an attribute.
+    """Write datasets with units and check sums, the walls as JSON, meshes as datasets.
 
     Parameters
     ----------
@@ -45,12 +34,15 @@ def write(packing: Packing, path: Path, fields: dict[str, NDArray[np.float64]]) 
         root.attrs["format"] = np.bytes_(FORMAT)
         root.attrs["version"] = VERSION
         root.attrs["periodic"] = np.array(packing.periodic, dtype=np.uint8)
-        root.attrs["walls"] = np.bytes_(json.dumps([_record(wall) for wall in packing.walls]))
-        for name, values in (
-            ("centres", packing.centres),
-            ("radii", packing.radii),
-            ("box", packing.box),
-        ):
+        root.attrs["walls"] = np.bytes_(json.dumps([record(w) for w in packing.walls]))
+        lengths = [("centres", packing.centres), ("radii", packing.radii), ("box", packing.box)]
+        for k, wall in enumerate(packing.walls):
+            if isinstance(wall, Mesh):
+                lengths.append((f"wall_{k}_vertices", wall.vertices))
+                root.create_dataset(
+                    f"wall_{k}_faces", data=wall.faces, chunks=True, fletcher32=True
+                )
+        for name, values in lengths:
             if values is not None:
                 # Check sums: a flipped bit on a disk must not become a moved sphere.
                 dataset = root.create_dataset(name, data=values, chunks=True, fletcher32=True)
