@@ -22,10 +22,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--model", choices=("mlp", "forest"), default="mlp", help="default: mlp")
     parser.add_argument(
         "--markers",
-        choices=("pencil", "published", "wall"),
+        choices=("pencil", "published", "wall", "exchange"),
         default="pencil",
         help="pencil: real blockers on a pencil of lines; published: r_j/d, spheres between, "
-        "r_j/r_i, solid fraction; wall: from spheres to walls (default: pencil)",
+        "r_j/r_i, solid fraction; wall: from spheres to walls; "
+        "exchange: absorption after reflections (default: pencil)",
     )
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="default: 0")
     parser.add_argument("--epochs", type=int, default=40, metavar="N", help="default: 40")

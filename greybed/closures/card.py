@@ -9,13 +9,18 @@ import numpy as np
 from greybed.closures.artifact import content_hash
 from greybed.closures.viewfactor.closure import ViewFactorClosure
 
-UNITS = {"viewfactor": "view factor between spheres", "wallfactor": "view factor sphere to wall"}
+UNITS = {
+    "viewfactor": "view factor between spheres",
+    "wallfactor": "view factor sphere to wall",
+    "exchange": "exchange factor between spheres",
+}
 WORDS = {
     "factor": "F",
     "solid_fraction": "solid fraction",
     "radius_ratio": "r_j / r_i",
     "blocked_fraction": "blocked share",
     "distance_over_radius": "distance from the wall / r",
+    "emissivity": "emissivity",
     "kind": "packings",
 }
 

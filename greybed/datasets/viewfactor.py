@@ -19,10 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from greybed._version import __version__
-from greybed.closures.viewfactor import MARKER_SETS, PairMarkers, neighbourhood, pair_markers
-from greybed.closures.viewfactor.bed import inner_fraction, near_reach
+from greybed.closures.viewfactor import PairMarkers, neighbourhood, pair_markers
+from greybed.closures.viewfactor.bed import inner_fraction
 from greybed.closures.viewfactor.exact import pair_factor
-from greybed.closures.viewfactor.walls import wall_distance, wall_markers
 from greybed.core import InputError, Packing
 from greybed.core.config import tables, whole
 from greybed.core.files import atomic_path, output_folder, writable_file
@@ -40,7 +39,14 @@ from greybed.datasets.beds import (
     emitters_of,
     refuse_without_splits,
 )
-from greybed.raytrace import standard_error, view_factors
+from greybed.datasets.tables import (
+    EXCHANGE_COLUMNS,
+    RESULTS,
+    WALL_COLUMNS,
+    exchange_rows_of,
+    wall_rows_of,
+)
+from greybed.raytrace import standard_error
 from greybed.raytrace.errors import sequence_error
 from greybed.raytrace.tally import MOST_RAYS, image_keys, trace
 
@@ -48,10 +54,7 @@ Array = NDArray[np.float64]
 
 FORMAT = "greybed-viewfactors"
 MARKERS = tuple(f.name for f in fields(PairMarkers))
-RESULTS = ("exact", "factor", "stderr", "weight")
 COLUMNS = (*MARKERS, *RESULTS)
-WALL_MARKERS = MARKER_SETS["wall"].names
-WALL_COLUMNS = (*WALL_MARKERS, *RESULTS)
 # Pairs whose factor is expected below this lie out of reach: a trace of the default length
 # gives them a few rays at most.
 LEAST_FACTOR = 5e-5
@@ -177,14 +180,17 @@ class ViewFactorData:
         Each packing's design.
     walls : ViewFactorData or None
         Rows (sphere, wall) with the same packings, their markers those of the set ``wall``.
+    exchange : ViewFactorData or None
+        Rows (pair, emissivity) of exchange factors, their markers those of the set ``exchange``.
     digest : str
-        SHA-256 over all columns, those of the walls included.
+        SHA-256 over all columns, those of walls and exchange included.
     """
 
     columns: dict[str, Array]
     packing: NDArray[np.int64]
     packings: list[dict[str, Any]]
     walls: ViewFactorData | None = None
+    exchange: ViewFactorData | None = None
     digest: str = field(init=False)
 
     def __post_init__(self) -> None:
@@ -192,8 +198,9 @@ class ViewFactorData:
         for name in sorted(self.columns):
             digest.update(name.encode())
             digest.update(np.ascontiguousarray(self.columns[name]).tobytes())
-        if self.walls is not None:
-            digest.update(self.walls.digest.encode())
+        for table in (self.walls, self.exchange):
+            if table is not None:
+                digest.update(table.digest.encode())
         object.__setattr__(self, "digest", digest.hexdigest())
 
     def __len__(self) -> int:
@@ -267,33 +274,6 @@ def rows_of(packing: Packing, emitters: int, rays: int, seed: int) -> dict[str, 
         "weight": 1.0 / (share * first[choose]),
     }
     return {name: column[keep] for name, column in columns.items()}
-
-
-def wall_rows_of(packing: Packing, emitters: int, rays: int, seed: int) -> dict[str, Array]:
-    """Trace the spheres near walls and give a row for every (emitter, wall)."""
-    if not packing.walls:
-        return {name: np.empty(0) for name in WALL_COLUMNS}
-    phi = inner_fraction(packing)
-    reach = near_reach(packing, phi)
-    everyone = np.arange(len(packing))
-    # Nobody deep in the bed sees a wall; there are three emitters here for one of the pairs.
-    near = np.min(
-        [wall_distance(packing, w, everyone) / packing.radii for w in packing.walls], axis=0
-    )
-    rng = np.random.default_rng([seed, 1])
-    weight = np.exp(-0.3 * near)
-    some = min(3 * emitters, len(packing))
-    who = np.sort(rng.choice(len(packing), some, replace=False, p=weight / weight.sum()))
-    m = wall_markers(packing, neighbourhood(packing, reach, who), reach, phi)
-    traced = view_factors(packing, rays=rays, seed=seed + 1, emitters=who)
-    columns = {name: getattr(m, name).ravel() for name in WALL_MARKERS} | {
-        "exact": m.wall_share.ravel(),
-        "factor": traced.wall_factors[who].ravel(),
-        "stderr": traced.wall_stderr[who].ravel(),
-        "weight": np.ones(m.wall_share.size),
-    }
-    seen = columns["wall_share"] > 1e-6
-    return {name: column[seen] for name, column in columns.items()}
 
 
 def generate(
@@ -390,6 +370,8 @@ def _one(entry: Bed, emitters: int, rays: int, seed: int, parts: Path) -> dict[s
         columns = rows_of(packing, some, rays, seed)
         walls = wall_rows_of(packing, some, rays, seed)
         columns |= {f"wall/{name}": column for name, column in walls.items()}
+        grey = exchange_rows_of(packing, some, rays, seed)
+        columns |= {f"exchange/{name}": column for name, column in grey.items()}
         with atomic_path(part) as temporary:
             np.savez(temporary, **columns)  # type: ignore[arg-type]
     return columns
@@ -400,7 +382,11 @@ def _kept(part: Path) -> dict[str, Array] | None:
     try:
         # Opened here, for numpy would leave a damaged file open.
         with open(part, "rb") as stream, np.load(stream, allow_pickle=False) as archive:
-            names = (*COLUMNS, *(f"wall/{name}" for name in WALL_COLUMNS))
+            names = (
+                *COLUMNS,
+                *(f"wall/{name}" for name in WALL_COLUMNS),
+                *(f"exchange/{name}" for name in EXCHANGE_COLUMNS),
+            )
             return {key: archive[key] for key in names}
     except Exception:  # absent, or cut as after a power failure: made again, with the same bits
         return None
@@ -418,6 +404,8 @@ def write(data: ViewFactorData, design: Design, path: Path) -> None:
         _write_rows(file, data, COLUMNS)
         if data.walls is not None:
             _write_rows(file.create_group("wall"), data.walls, WALL_COLUMNS)
+        if data.exchange is not None:
+            _write_rows(file.create_group("exchange"), data.exchange, EXCHANGE_COLUMNS)
 
 
 def _write_rows(group: h5py.Group, data: ViewFactorData, names: tuple[str, ...]) -> None:
@@ -446,10 +434,9 @@ def read(path: str | os.PathLike[str]) -> ViewFactorData:
                 raise InputError(
                     f"{file}: not a view-factor data set; make one with greybed dataset viewfactor."
                 )
-            columns = {name: content[name][...] for name in COLUMNS}
-            packing = content["packing"][...].astype(np.int64)
-            wall = {name: content["wall"][name][...] for name in WALL_COLUMNS}
-            wall_packing = content["wall"]["packing"][...].astype(np.int64)
+            columns, packing = _read_rows(content, COLUMNS)
+            wall = _read_rows(content["wall"], WALL_COLUMNS)
+            exchange = _read_rows(content["exchange"], EXCHANGE_COLUMNS)
             design = json.loads(content.attrs["design"])
             stored = content.attrs["sha256"].decode()
     except InputError:
@@ -460,9 +447,18 @@ def read(path: str | os.PathLike[str]) -> ViewFactorData:
             "again."
         ) from None
     tables = design["packing"]
-    data = ViewFactorData(columns, packing, tables, ViewFactorData(wall, wall_packing, tables))
+    data = ViewFactorData(
+        columns, packing, tables, ViewFactorData(*wall, tables), ViewFactorData(*exchange, tables)
+    )
     if data.digest != stored:
         raise InputError(
             f"{file}: the data do not match their SHA-256; copy the file again or make it again."
         )
     return data
+
+
+def _read_rows(
+    group: h5py.Group, names: tuple[str, ...]
+) -> tuple[dict[str, Array], NDArray[np.int64]]:
+    columns = {name: group[name][...] for name in names}
+    return columns, group["packing"][...].astype(np.int64)

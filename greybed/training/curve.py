@@ -28,7 +28,8 @@ def part_of(data: ViewFactorData, packings: int, seed: int = 0) -> ViewFactorDat
         chosen = np.isin(rows.packing, sorted(kept))
         columns = {name: column[chosen] for name, column in rows.columns.items()}
         walls = None if rows.walls is None else some(rows.walls)
-        return ViewFactorData(columns, rows.packing[chosen], rows.packings, walls)
+        grey = None if rows.exchange is None else some(rows.exchange)
+        return ViewFactorData(columns, rows.packing[chosen], rows.packings, walls, grey)
 
     return some(data)
 
@@ -61,10 +62,11 @@ def learning_curve(
     fitted = np.unique(table.packing[table.in_split("train")])
     inside = [k for k, p in enumerate(data.packings) if p["split"] != "train" or k in fitted]
     packings = [p if k in inside else {**p, "split": "unused"} for k, p in enumerate(data.packings)]
-    walls = data.walls
-    if walls is not None:
-        walls = ViewFactorData(walls.columns, walls.packing, packings)
-    data = ViewFactorData(data.columns, data.packing, packings, walls)
+    beside = [
+        None if rows is None else ViewFactorData(rows.columns, rows.packing, packings)
+        for rows in (data.walls, data.exchange)
+    ]
+    data = ViewFactorData(data.columns, data.packing, packings, *beside)
     points: list[dict[str, Any]] = []
     for number in sorted({max(1, round(share * len(fitted))) for share in shares}):
         try:

@@ -18,6 +18,7 @@ FACTORS = (1e-4, 1e-3, 1e-2, 1.0)
 RATIOS = (0.0, 0.5, 0.999, 1.001, 2.0, np.inf)
 BLOCKED = (0.0, 1e-9, 0.3, 0.7, 0.95, 1.01)
 DISTANCES = (0.0, 2.0, 4.0, 8.0, np.inf)
+EMISSIVITIES = (0.0, 0.3, 0.5, 0.7, 0.9, 1.01)
 # A regime of fewer rows says little.
 LEAST_ROWS = 50
 
@@ -78,6 +79,7 @@ def regimes(
         ("radius_ratio", RATIOS),
         ("blocked_fraction", BLOCKED),
         ("distance_over_radius", DISTANCES),
+        ("emissivity", EMISSIVITIES),
     ):
         # The factor is told apart by the prediction: bins of a noisy truth would be biased.
         value = p.view_factor if by == "factor" else c.get(by)

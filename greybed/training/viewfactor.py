@@ -26,9 +26,10 @@ def rows_for(data: ViewFactorData, markers: MarkerSet) -> ViewFactorData:
     """The rows of a data set that a marker set is for: pairs of spheres, or spheres and walls."""
     if markers.quantity == "viewfactor":
         return data
+    rows = data.walls if markers.quantity == "wallfactor" else data.exchange
     nothing = {name: np.empty(0) for name in (*markers.names, "exact", "factor", "stderr")}
     none = ViewFactorData(nothing, np.empty(0, np.int64), data.packings)
-    return none if data.walls is None else data.walls
+    return none if rows is None else rows
 
 
 def train(
@@ -49,7 +50,8 @@ def train(
     kind : str
         ``mlp`` or ``forest``.
     markers : str
-        ``pencil`` or ``published`` for pairs of spheres, ``wall`` for spheres and walls.
+        ``pencil`` or ``published`` for pairs of spheres, ``wall`` for spheres and walls,
+        ``exchange`` for exchange factors of pairs.
     seed : int
         Seed of the fit.
     epochs : int

@@ -15,6 +15,7 @@ from greybed.datasets.beds import (
 )
 from greybed.datasets.generate import random_packing
 from greybed.datasets.sizes import LogNormal
+from greybed.datasets.tables import wall_rows_of
 from greybed.datasets.viewfactor import (
     COLUMNS,
     Design,
@@ -24,7 +25,6 @@ from greybed.datasets.viewfactor import (
     reach_of,
     read,
     rows_of,
-    wall_rows_of,
 )
 from greybed.raytrace import view_factors
 

@@ -149,7 +149,7 @@ class ViewFactorClosure:
 
     @property
     def quantity(self) -> str:
-        """``viewfactor`` between spheres, or ``wallfactor`` from a sphere to a wall."""
+        """``viewfactor`` between spheres, ``wallfactor`` to a wall, or ``exchange`` factor."""
         return self.markers.quantity
 
     @property
@@ -259,7 +259,7 @@ class ViewFactorClosure:
                     f"{'(' if marker.low_open else '['}{marker.low:g}, {marker.high:g}]; "
                     "check how the markers were made."
                 )
-        if self.quantity != "viewfactor":
+        if self.quantity == "wallfactor":
             return m
         x = m["radius_over_distance"]
         reach = x * (1.0 + 1.0 / m["radius_ratio"])

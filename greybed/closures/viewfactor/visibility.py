@@ -80,6 +80,12 @@ WALL_BLOCKED = Marker(
     "blocked_fraction", "blocked share of the lines to the wall", 0.0, 1.0,
     free=0.0, typical=(0.0, 1.0),
 )  # fmt: skip
+VISIBLE = Marker(
+    "visible_share", "F_ij over the factor of the free pair", 0.0, 1.0, typical=(0.0, 1.0)
+)
+EMISSIVITY = Marker(
+    "emissivity", "emissivity of both spheres", 0.0, 1.0, low_open=True, typical=(0.05, 1.0)
+)
 
 
 def _pair_exact(m: Markers) -> Array:
@@ -136,6 +142,31 @@ def _wall_features(m: Markers) -> Array:
 
 def _wall_exact(m: Markers) -> Array:
     return m["wall_share"]
+
+
+def _reflected_bound(m: Markers) -> Array:
+    """Bound of what j absorbs after reflections: symmetric after multiplication with r_i^2."""
+    ratio2 = m["radius_ratio"] ** 2
+    return (1.0 - m["emissivity"]) * ratio2 / (1.0 + ratio2)
+
+
+def _exchange_exact(m: Markers) -> Array:
+    return m["emissivity"] * m["visible_share"] * _pair_exact(m) + _reflected_bound(m)
+
+
+def _exchange_gate(m: Markers) -> Array:
+    return _reflected_bound(m) / _exchange_exact(m)
+
+
+def _exchange_baseline(m: Markers) -> Array:
+    near, _ = _pair(m)
+    return 0.002 + 0.1 * near * near
+
+
+def _exchange_features(m: Markers) -> Array:
+    near, alike = _pair(m)
+    features = [near, np.log(near), alike, m["visible_share"], m["emissivity"], m["solid_fraction"]]
+    return np.stack(features, axis=-1)
 
 
 @dataclass(frozen=True)
@@ -195,6 +226,25 @@ MARKER_SETS = {
         _pencil_baseline,
         _wall_exact,
         "wallfactor",
+    ),
+    # D_ij = e F_ij + (1 - e) K_ij: what j absorbs at the first hit, and after reflections. K, the
+    # mean of D over the places of the first reflection, is learnt between 0 and its bound.
+    "exchange": MarkerSet(
+        "exchange",
+        (OVER_DISTANCE, RATIO, VISIBLE, EMISSIVITY, FRACTION),
+        (
+            _SHARED[0],
+            "log((r_i + r_j) / d)",
+            _SHARED[1],
+            "visible_share",
+            "emissivity",
+            "solid_fraction",
+        ),
+        _exchange_features,
+        _exchange_gate,
+        _exchange_baseline,
+        _exchange_exact,
+        "exchange",
     ),
 }
 
