@@ -11,6 +11,7 @@ it stopped when the same command is given again. A design lists packings and how
   rays = 150000                 # per emitter
   emitters = 40                 # per packing
   seed = 1
+  exchange = true               # also exchange factors, which take longest
   [[packing]]
   kind = "random"
   fraction = 0.5

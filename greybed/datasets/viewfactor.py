@@ -75,6 +75,7 @@ class Design:
     rays: int = whole(150_000, at_least=100, at_most=MOST_RAYS)  # per emitter [-]
     emitters: int = whole(40, at_least=1)  # per packing [-]
     seed: int = whole(1, at_least=0, at_most=MOST_SEED)
+    exchange: bool = True  # also trace exchange factors, which takes longest
 
     def __post_init__(self) -> None:
         refuse_without_splits(self.packing)
@@ -102,7 +103,7 @@ def quick_design(seed: int = 1) -> Design:
         for split, sizes, fractions in rows
         for k, phi in enumerate(fractions)
     ]
-    return Design(packing=tuple(packings), seed=seed)
+    return Design(packing=tuple(packings), seed=seed, exchange=False)
 
 
 def default_design(seed: int = 1) -> Design:
@@ -308,7 +309,7 @@ def generate(
     target = writable_file(path)
     parts = output_folder(target.with_name(target.name + ".parts"))
     jobs = [
-        (entry, design.emitters, design.rays, design.seed + 1000 * number, parts)
+        (entry, design.emitters, design.rays, design.seed + 1000 * number, design.exchange, parts)
         for number, entry in enumerate(design.packing)
     ]
     done: list[dict[str, Array]] = [{}] * len(jobs)
@@ -343,7 +344,7 @@ def _joined(
 
 @contextmanager
 def _finished(
-    jobs: list[tuple[Bed, int, int, int, Path]], workers: int
+    jobs: list[tuple[Bed, int, int, int, bool, Path]], workers: int
 ) -> Iterator[Iterator[tuple[int, dict[str, Array]]]]:
     """Numbers and columns of the packings, as they are finished."""
     if workers == 1:
@@ -359,9 +360,11 @@ def _finished(
             raise
 
 
-def _one(entry: Bed, emitters: int, rays: int, seed: int, parts: Path) -> dict[str, Array]:
+def _one(
+    entry: Bed, emitters: int, rays: int, seed: int, exchange: bool, parts: Path
+) -> dict[str, Array]:
     """Columns of one packing, made, or kept from a run that was stopped."""
-    settings = json.dumps([as_table(entry), rays, emitters, seed, __version__])
+    settings = json.dumps([as_table(entry), rays, emitters, seed, exchange, __version__])
     part = parts / f"{hashlib.sha256(settings.encode()).hexdigest()[:16]}.npz"
     columns = _kept(part)
     if columns is None:
@@ -370,7 +373,9 @@ def _one(entry: Bed, emitters: int, rays: int, seed: int, parts: Path) -> dict[s
         columns = rows_of(packing, some, rays, seed)
         walls = wall_rows_of(packing, some, rays, seed)
         columns |= {f"wall/{name}": column for name, column in walls.items()}
-        grey = exchange_rows_of(packing, some, rays, seed)
+        grey = {name: np.empty(0) for name in EXCHANGE_COLUMNS}
+        if exchange:
+            grey = exchange_rows_of(packing, some, rays, seed)
         columns |= {f"exchange/{name}": column for name, column in grey.items()}
         with atomic_path(part) as temporary:
             np.savez(temporary, **columns)  # type: ignore[arg-type]
@@ -398,6 +403,7 @@ def write(data: ViewFactorData, design: Design, path: Path) -> None:
         file.attrs["format"] = np.bytes_(FORMAT)
         tables = {"packing": data.packings}
         settings = {"rays": design.rays, "emitters": design.emitters, "seed": design.seed}
+        settings["exchange"] = int(design.exchange)
         file.attrs["design"] = np.bytes_(json.dumps(tables | settings))
         file.attrs["sha256"] = np.bytes_(data.digest)
         file.attrs["greybed"] = np.bytes_(__version__)

@@ -215,7 +215,7 @@ def curve_figure(packings: Sequence[int], rmse: Sequence[float]) -> Markup:
 
 
 def _limits(cases: Sequence[LimitCase]) -> Section:
-    rows = [
+    rows: list[list[Cell | str]] = [
         [
             case.name, number(case.error, 2), number(case.bound, 2),
             Cell("✓ holds", "good") if case.passed else Cell("✗ fails", "bad"),
@@ -233,7 +233,7 @@ def _limits(cases: Sequence[LimitCase]) -> Section:
 def _card(card: Mapping[str, Any]) -> Section:
     packings = card.get("packings", {})
     fractions = card.get("solid_fractions") or [float("nan")]
-    facts = [
+    facts: list[list[Cell | str]] = [
         ["data set (SHA-256)", str(card.get("data_sha256", ""))],
         ["packings", ", ".join(f"{n} to {split}" for split, n in packings.items())],
         ["kinds", ", ".join(card.get("kinds", ()))],
@@ -245,7 +245,7 @@ def _card(card: Mapping[str, Any]) -> Section:
             for name, (low, high) in card.get("ranges", {}).items()
         ),
     ]
-    known = [
+    known: list[list[Cell | str]] = [
         ["other shapes than spheres", "neither the exact law nor the markers hold"],
         ["markers outside the ranges above", "flagged as extrapolation, never clipped"],
         ["row sums", "not one by themselves; closure.factors(packing) balances them"],

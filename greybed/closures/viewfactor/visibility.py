@@ -56,7 +56,7 @@ OVER_DISTANCE = Marker("radius_over_distance", "r_j / d", 0.0, 1.05, low_open=Tr
 RATIO = Marker("radius_ratio", "r_j / r_i", 0.0, np.inf, low_open=True)
 COUNT = Marker(
     "n_between", "spheres in the hull of i and j, by the share of its section", 0.0, np.inf,
-    free=0.0, typical=(0.0, 20.0),
+    free=0.0, typical=(0.0, 60.0),
 )  # fmt: skip
 FRACTION = Marker(
     "solid_fraction", "solid fraction of the bed", 0.0, 1.0, low_open=True, typical=(0.02, 0.64)

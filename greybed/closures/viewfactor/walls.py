@@ -151,13 +151,13 @@ def free_shares(packing: Packing, emitters: NDArray[np.int64]) -> Array | None:
         across = _across(normals[k], normals)
         low = np.full((len(c), 2), -np.inf)
         high = np.full((len(c), 2), np.inf)
-        for other, n in enumerate(normals):
-            for axis_number in range(2):
-                along = float(n @ across[axis_number])
+        for away, normal in zip(height, normals, strict=True):
+            for side_number in range(2):
+                along = float(normal @ across[side_number])
                 if along > 0.5:
-                    low[:, axis_number] = -height[other]
+                    low[:, side_number] = -away
                 elif along < -0.5:
-                    high[:, axis_number] = height[other]
+                    high[:, side_number] = away
         shares[:, walls.index(wall)] = rectangle_share(low, high, height[k])
     return shares
 
