@@ -327,6 +327,7 @@ def generate(
         *_joined(done, COLUMNS, ""),
         tables,
         ViewFactorData(*_joined(done, WALL_COLUMNS, "wall/"), tables),
+        ViewFactorData(*_joined(done, EXCHANGE_COLUMNS, "exchange/"), tables),
     )
     write(data, design, target)
     shutil.rmtree(parts, ignore_errors=True)

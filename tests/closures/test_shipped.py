@@ -1,4 +1,4 @@
-"""Closures that come with greybed: loaded by name, small, within their limits, refused if unknown."""
+"""Closures that come with greybed: loaded by name, small, within their limits."""
 
 import pytest
 

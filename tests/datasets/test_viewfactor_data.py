@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from greybed.closures.viewfactor.exact import pair_factor
 from greybed.core import InputError
 from greybed.datasets import viewfactor
 from greybed.datasets.beds import (
@@ -15,7 +16,7 @@ from greybed.datasets.beds import (
 )
 from greybed.datasets.generate import random_packing
 from greybed.datasets.sizes import LogNormal
-from greybed.datasets.tables import wall_rows_of
+from greybed.datasets.tables import exchange_rows_of, wall_rows_of
 from greybed.datasets.viewfactor import (
     COLUMNS,
     Design,
@@ -76,6 +77,8 @@ def test_round_trip(data):
     assert again.digest == made.digest
     for name in COLUMNS:
         np.testing.assert_array_equal(again.columns[name], made.columns[name])
+    assert len(again.exchange) == len(made.exchange) > 1000
+    np.testing.assert_array_equal(again.exchange.packing, made.exchange.packing)
     assert [p["split"] for p in again.packings] == ["train", "calibrate", "test"]
 
 
@@ -162,6 +165,25 @@ def test_shear_leaves_an_oriented_fabric():
     along = ((delta / distance[:, None]) ** 2).mean(axis=0)
     # One third each in an isotropic bed; the error of a mean over some 1000 contacts is 0.01.
     assert along[2] > along[0] + 0.03
+
+
+def test_exchange_of_touching_spheres():
+    """FCC at contact, nearest pairs, against independent reflecting rays: e D = 0.0531 at 0.8."""
+    packing = LatticeBed(fraction=0.74, lattice="fcc", cells=3).packing(1)
+    c = exchange_rows_of(packing, 16, 60_000, seed=1)
+    near = c["radius_over_distance"] > 0.499
+    mine = near & (c["emissivity"] == 0.8)
+    mean = 0.8 * c["factor"][mine].mean()
+    error = 0.8 * np.sqrt((c["stderr"][mine] ** 2).sum()) / mine.sum()
+    # The reference carries three digits.
+    assert mean == pytest.approx(0.0531, abs=4.0 * error + 0.5e-4)
+    # Where e F is exact the rest is what reflections bring: it never lacks.
+    direct = (
+        c["emissivity"]
+        * c["visible_share"]
+        * pair_factor(c["radius_over_distance"], c["radius_ratio"])
+    )
+    assert (c["factor"] >= direct - 6.0 * c["stderr"]).all()
 
 
 def test_wall_rows_follow_the_trace(tmp_path):
