@@ -178,6 +178,7 @@ def main() -> None:
     parser.add_argument("--emitters", type=int, default=12, help="per held-out packing")
     parser.add_argument("--rays", type=int, default=2_000_000, help="per emitter of the truth")
     parser.add_argument("--bed-rays", type=int, default=100_000, help="per sphere, twice")
+    parser.add_argument("--pairs-only", action="store_true", help="no whole beds")
     parser.add_argument("--out", help="also write these numbers as JSON")
     options = parser.parse_args()
     truth = held_out(options.emitters, options.rays)
@@ -210,13 +211,13 @@ def main() -> None:
              whole.evaluate(**{n: other.columns[n] for n in whole.marker_names}))  # fmt: skip
         wall = train(data, "mlp", "wall", epochs=options.epochs)
     else:
-        names = ("mlp_published", "forest_published", "mlp_pencil", "forest_pencil")
+        names = ("mlp_published", "mlp_pencil")
         closures = {name.replace("_", ", "): shipped(f"viewfactor_{name}") for name in names}
         wall = shipped("wallfactor_mlp_wall")
     for name, closure in closures.items():
         note(name, closure.evaluate(**{n: truth.columns[n] for n in closure.marker_names}))
     print("published network, on its authors' rows:", PUBLISHED)
-    beds = whole_beds(closures["mlp, pencil"], wall, options.bed_rays)
+    beds = [] if options.pairs_only else whole_beds(closures["mlp, pencil"], wall, options.bed_rays)
     for row in beds:
         print(
             f"{row['bed']:<28}{row['field']:<24} flux {100 * row['flux_rms']:.2f} % rms (noise "
