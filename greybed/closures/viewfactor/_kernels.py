@@ -186,7 +186,7 @@ def pairs_between(
 
 @njit(**_OPTIONS)
 def free_lines(
-    emitters, vector, near_radii, start, directions, offsets, length, edge, through
+    emitters, vector, near_radii, start, stop, directions, offsets, length, edge, through
 ):  # fmt: skip
     """Share of each line that gets past the neighbours, ``through`` (e, n_lines).
 
@@ -198,7 +198,7 @@ def free_lines(
             wx, wy, wz = directions[e, m, 0], directions[e, m, 1], directions[e, m, 2]
             ox, oy, oz = offsets[e, m, 0], offsets[e, m, 1], offsets[e, m, 2]
             share = 1.0
-            for k in range(start[e], start[e + 1]):
+            for k in range(start[e], stop[e]):
                 bx, by, bz = vector[k, 0] - ox, vector[k, 1] - oy, vector[k, 2] - oz
                 t = bx * wx + by * wy + bz * wz
                 if t <= 0.0 or t >= length[e, m]:
