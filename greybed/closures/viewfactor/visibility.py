@@ -89,6 +89,7 @@ EMISSIVITY = Marker(
 
 
 def _pair_exact(m: Markers) -> Array:
+    """Exact factor of a free pair [-]."""
     return pair_factor(m["radius_over_distance"], m["radius_ratio"])
 
 
