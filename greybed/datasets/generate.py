@@ -35,7 +35,6 @@ __all__ = [
     "Uniform",
     "parse_sizes",
     "random_packing",
-    "sheared_packing",
     "solid_fraction_between_walls",
     "wall_overlap",
 ]
@@ -53,7 +52,6 @@ STEPS_DEFLATED = 8_000  # and of each stage of a deflation [-]
 TOP = 0.8  # fraction at which a deflation starts, jammed for all but very wide sizes [-]
 MOST_SPHERES = 10**8  # of one packing: beyond, memory and patience end [-]
 MOST_SWEEPS = 10**6
-SHEAR_STEP = 0.02  # strain between two relaxations of a sheared bed [-]
 KICK = 5e-3  # random displacement at each stage of a deflation, in mean radii [-]
 
 
@@ -357,49 +355,3 @@ def random_packing(
         with progress(shake, "shaking", show=show_progress) as advance:
             centres = _shake(setup, centres, lengths, shake, rng, advance)
     return _verified(setup, centres, lengths, rng.permutation(n))
-
-
-def sheared_packing(
-    n: int, solid_fraction: float, sizes: Sizes, stretch: float, *, seed: int = 0
-) -> Packing:
-    """Random packing that was sheared: its fabric differs from direction to direction.
-
-    A random packing in a periodic box is stretched along x and pressed together along z, at
-    constant volume, in steps of 2 %; after each step the spheres push each other apart. It ends
-    in a cube.
-
-    Parameters
-    ----------
-    n, solid_fraction, sizes, seed
-        As for :func:`random_packing`.
-    stretch : float
-        Final over first edge along x, 1 to 2 [-].
-
-    Raises
-    ------
-    InputError
-        If a number is out of range, or the bed jams on the way.
-    """
-    if not 1.0 <= stretch <= 2.0:
-        raise InputError(f"stretch = {stretch:g} [-] must lie in 1 ... 2; mend it.")
-    bed = random_packing(
-        n, solid_fraction, sizes, container=PeriodicBox(aspect=(1.0 / stretch, 1.0, stretch)),
-        seed=seed,
-    )  # fmt: skip
-    scale = float(bed.radii.mean())
-    falling = np.argsort(-bed.radii, kind="stable")
-    radii = bed.radii[falling]
-    setup = _Setup(radii=radii / scale, metres=radii, container=PeriodicBox(), scale=scale)
-    lengths, x = bed.edges / scale, bed.centres[falling] / scale
-    steps = max(1, math.ceil(math.log(stretch) / SHEAR_STEP))
-    factor = stretch ** (1.0 / steps)
-    for step in range(steps):
-        turn = np.array([factor, 1.0, 1.0 / factor])
-        state = _relax(setup, x * turn, lengths * turn, STEPS)
-        if not state.done:
-            raise InputError(
-                f"stretch = {stretch:g} [-]: the bed at solid fraction {solid_fraction:g} [-] jams "
-                f"at {factor**step:.2f}; lower the stretch or the fraction."
-            )
-        x, lengths = state.centres, lengths * turn
-    return _verified(setup, x, lengths, np.argsort(falling))
