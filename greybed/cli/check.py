@@ -2,6 +2,7 @@
 
 Examples:
   greybed check bed.closure
+  greybed check shipped:viewfactor_mlp_pencil
   greybed check bed.closure --exported cpp,onnx --out runs/check
 
 --exported runs the same limiting cases on the compiled C++ header and on the ONNX graph. The exit
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``greybed check``."""
-    parser.add_argument("model", metavar="MODEL", help="a .closure file")
+    parser.add_argument("model", metavar="MODEL", help="a .closure file, or shipped:NAME")
     parser.add_argument(
         "--exported",
         type=targets,
@@ -92,15 +93,16 @@ def run(options: argparse.Namespace) -> int:
     import tempfile
     from pathlib import Path
 
-    from greybed.closures import content_hash, load
+    from greybed.closures import content_hash, load, model_path
     from greybed.closures.artifact import GOLDEN_ROWS, GOLDEN_TOLERANCE
     from greybed.closures.viewfactor.limits import check_limits
     from greybed.core import VerificationError
     from greybed.core.files import output_folder, write_summary
 
     out = output_folder(options.out) if options.out else None
+    file = model_path(options.model)
     try:
-        closure = load(options.model)  # replays the golden rows
+        closure = load(file)  # replays the golden rows
     except VerificationError as error:
         print(f"greybed check: {error}", file=sys.stderr)
         return 1
@@ -132,6 +134,6 @@ def run(options: argparse.Namespace) -> int:
         results["exported"][target] = {"limiting_cases": _plain(found["cases"]), **rows}
     results["passed"] = passed
     if out is not None:
-        print(f"wrote {write_summary(out, 'check', results, options.model)}")
+        print(f"wrote {write_summary(out, 'check', results, file)}")
     print("all hold" if passed else "a check FAILED")
     return 0 if passed else 1

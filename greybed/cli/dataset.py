@@ -2,22 +2,26 @@
 
 Examples:
   greybed dataset viewfactor --out runs/viewfactor.h5
-  greybed dataset viewfactor design.toml --out runs/viewfactor.h5
+  greybed dataset viewfactor design.toml --out runs/viewfactor.h5 --workers 2
 
-Without a design the default one is made (32 packings, solid fractions 0.10 to 0.63, about a
-minute on two cores). A killed run continues where it stopped when the same command is given
-again. A design lists packings and how they are traced:
+Without a design the default one is made: 70 packings of solid fraction 0.05 to 0.64, random,
+walled, sheared, layered and on lattices, some minutes on two cores. A killed run continues where
+it stopped when the same command is given again. A design lists packings and how they are traced:
 
   rays = 150000                 # per emitter
   emitters = 40                 # per packing
   seed = 1
+  exchange = true               # also exchange factors, which take longest
   [[packing]]
   kind = "random"
   fraction = 0.5
   sizes = "lognormal:1mm,1.3"   # as for greybed pack
   count = 500
   shake = 100
-  split = "train"               # train, calibrate or test
+  split = "train"               # train, calibrate or test; each must be there
+
+Other kinds: "walled" (container = "box" or "cylinder"), "sheared" (stretch), "layered" (upper,
+upper_sizes) and "lattice" (lattice = "sc", "bcc" or "fcc", jitter, cells).
 """
 
 from __future__ import annotations
@@ -31,6 +35,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("quantity", choices=("viewfactor",), help="what the closure will give")
     parser.add_argument("design", nargs="?", help="TOML file (default: the built-in design)")
     parser.add_argument("--out", required=True, metavar="FILE", help="HDF5 file to write")
+    parser.add_argument(
+        "--workers", type=int, default=1, metavar="N",
+        help="processes; the result does not depend on it (default: 1, on all cores)",
+    )  # fmt: skip
     parser.add_argument("--seed", type=int, metavar="S", help="overrides the design's seed")
 
 
@@ -40,7 +48,8 @@ def run(options: argparse.Namespace) -> int:
 
     from greybed.core.config import read_case
     from greybed.core.files import output_folder, sole_writer, writable_file, write_summary
-    from greybed.datasets.viewfactor import SPLITS, Design, default_design, generate
+    from greybed.datasets.beds import SPLITS
+    from greybed.datasets.viewfactor import Design, default_design, generate
 
     design = read_case(options.design, Design) if options.design else default_design()
     if options.seed is not None:
@@ -49,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
     output_folder(target.parent)
     begin = time.perf_counter()
     with sole_writer(target.with_name(f".{target.name}.lock")):
-        data = generate(design, target, show_progress=True)
+        data = generate(design, target, workers=options.workers, show_progress=True)
     splits = {s: sum(p["split"] == s for p in data.packings) for s in SPLITS}
     inputs = [options.design] if options.design else []
     write_summary(

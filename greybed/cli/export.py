@@ -34,7 +34,9 @@ def targets(text: str) -> tuple[str, ...]:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``greybed export``."""
-    parser.add_argument("model", metavar="MODEL", help="a .closure file or a grey-box term")
+    parser.add_argument(
+        "model", metavar="MODEL", help="a .closure file, shipped:NAME, or a grey-box term"
+    )
     parser.add_argument(
         "--to", type=targets, required=True, metavar="LIST", help="cpp, onnx, or cpp,onnx"
     )
@@ -96,12 +98,19 @@ def run(options: argparse.Namespace) -> int:
     import os
     import tempfile
 
-    from greybed.closures import content_hash, load
+    from greybed.closures import content_hash, load, model_path
     from greybed.closures.term import is_term, load_term
+    from greybed.core import InputError
     from greybed.core.files import atomic_path, output_folder, write_summary
 
-    term = load_term(options.model) if is_term(options.model) else None
-    closure = None if term is not None else load(options.model)
+    model = model_path(options.model)
+    term = load_term(model) if is_term(model) else None
+    closure = None if term is not None else load(model)
+    if closure is not None and closure.quantity != "viewfactor":
+        raise InputError(
+            f"{options.model}: closures of {closure.quantity} cannot be exported yet; export one "
+            "of pairs of spheres, or evaluate this one in Python."
+        )
     folder = output_folder(options.out)
     results: dict[str, Any] = {}
     # Files reach their place only after the replay: a header that computes wrongly is never seen.
@@ -133,12 +142,12 @@ def run(options: argparse.Namespace) -> int:
         for file in files:
             with atomic_path(folder / file) as temporary:
                 os.replace(workplace / file, temporary)
-    sealed = term.content_hash() if term is not None else content_hash(load(options.model))
+    sealed = term.content_hash() if term is not None else content_hash(load(model))
     summary = write_summary(
         folder,
         "export",
         {"hash": sealed, "files": files, "targets": results},
-        options.model,
+        model,
     )
     for file in files:
         print(f"wrote {folder / file}")

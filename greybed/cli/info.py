@@ -1,7 +1,8 @@
-"""Describe a packing: spheres, radii, box, walls, solid fraction, overlaps, coordination.
+"""Describe a packing (spheres, radii, box, walls, overlaps, coordination) or a closure (its card).
 
-Example:
+Examples:
   greybed info bed.dump --out runs/bed
+  greybed info shipped:viewfactor_mlp_pencil
 """
 
 from __future__ import annotations
@@ -16,9 +17,11 @@ if TYPE_CHECKING:
 TOUCHING = 1e-3
 
 
-def add_input_arguments(parser: argparse.ArgumentParser) -> None:
+def add_input_arguments(
+    parser: argparse.ArgumentParser, files: str = "dump, CSV, HDF5 or legacy VTK"
+) -> None:
     """Add the packing file and what has to be said about files that do not say it themselves."""
-    parser.add_argument("file", metavar="FILE", help="dump, CSV, HDF5 or legacy VTK")
+    parser.add_argument("file", metavar="FILE", help=files)
     parser.add_argument(
         "--length-unit",
         metavar="U",
@@ -41,7 +44,7 @@ def read_input(options: argparse.Namespace) -> Packing:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``greybed info``."""
-    add_input_arguments(parser)
+    add_input_arguments(parser, "dump, CSV, HDF5 or legacy VTK; a .closure file or shipped:NAME")
     parser.add_argument("--out", metavar="DIR", help="also write DIR/summary.json")
 
 
@@ -131,12 +134,23 @@ def report(results: dict[str, Any], title: str) -> str:
 
 def run(options: argparse.Namespace) -> int:
     """Print the description and, with ``--out``, write it."""
-    packing = read_input(options)
-    results = describe(packing)
-    print(report(results, str(options.file)))
+    from greybed.closures.artifact import SUFFIX
+    from greybed.closures.shipping import PREFIX, model_path
+
+    file = options.file
+    if str(file).startswith(PREFIX) or str(file).endswith(SUFFIX):
+        from greybed.closures import load
+        from greybed.closures.card import describe_closure, report_closure
+
+        file = model_path(file)
+        results = describe_closure(load(file))
+        print(report_closure(results, str(options.file)))
+    else:
+        results = describe(read_input(options))
+        print(report(results, str(file)))
     if options.out:
         from greybed.core.files import output_folder, write_summary
 
-        summary = write_summary(output_folder(options.out), "info", results, options.file)
+        summary = write_summary(output_folder(options.out), "info", results, file)
         print(f"wrote {summary}")
     return 0

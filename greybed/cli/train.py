@@ -3,8 +3,9 @@
 Example:
   greybed train viewfactor runs/viewfactor.h5 --model mlp --out runs
 
-Writes NAME.closure (one file: weights, markers, ranges, golden rows) and summary.json. The
-exit code is 1 if a limiting case fails.
+Writes NAME.closure (one file: weights, markers, ranges, golden rows), NAME.html (errors by regime,
+calibration, learning curve, model card) and summary.json. The exit code is 1 if a limiting case
+fails.
 """
 
 from __future__ import annotations
@@ -21,13 +22,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--model", choices=("mlp", "forest"), default="mlp", help="default: mlp")
     parser.add_argument(
         "--markers",
-        choices=("pencil", "published"),
+        choices=("pencil", "published", "wall", "exchange"),
         default="pencil",
         help="pencil: real blockers on a pencil of lines; published: r_j/d, spheres between, "
-        "r_j/r_i, solid fraction (default: pencil)",
+        "r_j/r_i, solid fraction; wall: from spheres to walls; "
+        "exchange: absorption after reflections (default: pencil)",
     )
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="default: 0")
     parser.add_argument("--epochs", type=int, default=40, metavar="N", help="default: 40")
+    parser.add_argument(
+        "--no-curve", action="store_true", help="leave out the learning curve, which takes as long "
+        "as the training itself",
+    )  # fmt: skip
     parser.add_argument("--name", help="name of the file (default: viewfactor_MODEL_MARKERS)")
     parser.add_argument("--out", required=True, metavar="DIR", help="folder to write into")
 
@@ -36,15 +42,19 @@ def run(options: argparse.Namespace) -> int:
     """Train, check the limits, write the artifact."""
     from greybed.closures import content_hash, save
     from greybed.closures.artifact import SUFFIX
+    from greybed.closures.viewfactor import MARKER_SETS
     from greybed.closures.viewfactor.limits import check_limits
     from greybed.core import InputError
     from greybed.core.files import output_folder, writable_file, write_summary
     from greybed.datasets.viewfactor import read
-    from greybed.training import train
+    from greybed.report.model import render_model
+    from greybed.training import learning_curve, train
+    from greybed.training.viewfactor import rows_for
 
     if options.epochs < 1:
         raise InputError(f"--epochs = {options.epochs} must be at least 1.")
-    name = f"viewfactor_{options.model}_{options.markers}"
+    quantity = MARKER_SETS[options.markers].quantity
+    name = f"{quantity}_{options.model}_{options.markers}"
     name = name if options.name is None else options.name
     if not name.strip(". ") or Path(name).name != name:
         raise InputError(f"--name = {name!r} is no file name; give one without folders.")
@@ -60,8 +70,14 @@ def run(options: argparse.Namespace) -> int:
     except InputError as error:
         raise InputError(f"{options.data}: {error}") from None
     seconds = time.perf_counter() - begin
+    if not options.no_curve:
+        closure.card["learning_curve"] = learning_curve(
+            data, options.model, options.markers, seed=options.seed, epochs=options.epochs
+        )
     path = save(closure, target)
     cases = check_limits(closure)
+    rows = rows_for(data, closure.markers)
+    page = render_model(closure, rows, cases, target.with_suffix(".html"), name=name)
     score = closure.card["score"]
     write_summary(
         target.parent,
@@ -69,7 +85,10 @@ def run(options: argparse.Namespace) -> int:
         {
             "file": path.name,
             "hash": content_hash(closure),
+            "report": page.name,
             "score": score,
+            "regimes": closure.card["regimes"],
+            "learning_curve": closure.card.get("learning_curve", []),
             "limits": {case.name: case.passed for case in cases},
             "seconds": seconds,
         },
@@ -81,6 +100,7 @@ def run(options: argparse.Namespace) -> int:
         f"{path}: R2 = {score['r2']:.5f} (95 %: {low:.5f} to {high:.5f}), RMSE = "
         f"{score['rmse']:.2e} over {score['pairs']} pairs of {score['packings']} unseen packings"
     )
+    print(f"report: {page}")
     failed = [case.name for case in cases if not case.passed]
     for name_ in failed:
         print(f"limiting case fails: {name_}")

@@ -188,7 +188,8 @@ def view_factors(
         from greybed import closures
 
         assert radiation.closure is not None  # checked by RadiationTable
-        result = closures.load(radiation.closure).bed_factors(packing)
+        file = closures.model_path(radiation.closure)
+        result = closures.load(file).bed_factors(packing)
     else:
         from greybed import raytrace
 

@@ -6,8 +6,11 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -17,83 +20,60 @@ from numpy.typing import NDArray
 
 from greybed._version import __version__
 from greybed.closures.viewfactor import PairMarkers, neighbourhood, pair_markers
+from greybed.closures.viewfactor.bed import inner_fraction
 from greybed.closures.viewfactor.exact import pair_factor
 from greybed.core import InputError, Packing
-from greybed.core.config import choice, quantity, tables, whole
 from greybed.core.files import atomic_path, output_folder, writable_file
 from greybed.core.progress import progress
 from greybed.core.readers.opening import mapped, shown
-from greybed.datasets.generate import MOST_SPHERES, random_packing
-from greybed.datasets.sizes import parse_sizes
+from greybed.datasets.beds import (
+    Bed,
+    as_table,
+    emitters_of,
+)
+from greybed.datasets.designs import (
+    MOST_SEED,
+    Design,
+    PackingDesign,
+    default_design,
+    quick_design,
+)
+from greybed.datasets.tables import (
+    EXCHANGE_COLUMNS,
+    RESULTS,
+    WALL_COLUMNS,
+    exchange_rows_of,
+    wall_rows_of,
+)
 from greybed.raytrace import standard_error
-from greybed.raytrace.tally import MOST_RAYS, image_keys, trace
+from greybed.raytrace.errors import sequence_error
+from greybed.raytrace.tally import image_keys, trace
+
+__all__ = [
+    "MOST_SEED",
+    "Design",
+    "PackingDesign",
+    "ViewFactorData",
+    "default_design",
+    "generate",
+    "quick_design",
+    "reach_of",
+    "read",
+    "rows_of",
+    "write",
+]
 
 Array = NDArray[np.float64]
 
 FORMAT = "greybed-viewfactors"
-SPLITS = ("train", "calibrate", "test")
 MARKERS = tuple(f.name for f in fields(PairMarkers))
-COLUMNS = (*MARKERS, "exact", "factor", "stderr", "weight")
+COLUMNS = (*MARKERS, *RESULTS)
 # Pairs whose factor is expected below this lie out of reach: a trace of the default length
 # gives them a few rays at most.
 LEAST_FACTOR = 5e-5
 # Pairs expected below this are thinned (they are nine in ten); their weight makes up for it.
 FULL_FACTOR = 1e-4
 LEAST_SHARE = 0.05
-MOST_SEED = 2**32 - 1
-
-
-@dataclass(frozen=True, kw_only=True)
-class PackingDesign:
-    """One packing of a data set."""
-
-    fraction: float = quantity("dimensionless", above=0.0, at_most=0.7)  # solid fraction [-]
-    sizes: str = "mono:1mm"  # as for greybed pack
-    count: int = whole(500, at_least=20, at_most=MOST_SPHERES)  # spheres [-]
-    shake: int = whole(100, at_least=0)  # Monte-Carlo sweeps, 0 leaves spheres just touching [-]
-    split: str = choice(SPLITS, "train")
-
-    def __post_init__(self) -> None:
-        parse_sizes(self.sizes)  # refused here, not after hours of other packings
-
-
-@dataclass(frozen=True, kw_only=True)
-class Design:
-    """A data set: packings, and how each is traced."""
-
-    packing: tuple[PackingDesign, ...] = tables("kind", {"random": PackingDesign})
-    rays: int = whole(150_000, at_least=100, at_most=MOST_RAYS)  # per emitter [-]
-    emitters: int = whole(40, at_least=1)  # per packing [-]
-    seed: int = whole(1, at_least=0, at_most=MOST_SEED)
-
-    def __post_init__(self) -> None:
-        if not self.packing:
-            raise InputError("packing is empty; give at least one [[packing]] table.")
-        if not 0 <= self.seed <= MOST_SEED:  # also from --seed, which no case rule sees
-            raise InputError(f"seed = {self.seed} [-] must lie in 0 ... {MOST_SEED}; mend it.")
-
-
-def default_design(seed: int = 1) -> Design:
-    """Solid fractions 0.10 to 0.63, one size, log-normal and two sizes; a minute on two cores."""
-    mono, wide, two = "mono:1mm", "lognormal:1mm,1.3", "discrete:0.7mm=0.5,1.4mm=0.5"
-    rows: tuple[tuple[str, str, tuple[float, ...]], ...] = (
-        ("train", mono, (0.10, 0.20, 0.30, 0.40, 0.50, 0.55, 0.62)),
-        ("train", wide, (0.10, 0.25, 0.40, 0.50, 0.60, 0.63)),
-        ("train", two, (0.15, 0.35, 0.45, 0.55, 0.60, 0.63)),
-        ("calibrate", mono, (0.15, 0.58)),
-        ("calibrate", wide, (0.30, 0.55)),
-        ("calibrate", two, (0.25, 0.50)),
-        ("test", mono, (0.12, 0.45, 0.57)),
-        ("test", wide, (0.20, 0.52)),
-        ("test", two, (0.40, 0.58)),
-    )
-    packings = [
-        # Every other packing keeps its touching pairs, as a settled bed has them.
-        PackingDesign(fraction=phi, sizes=sizes, split=split, shake=100 * (k % 2))
-        for split, sizes, fractions in rows
-        for k, phi in enumerate(fractions)
-    ]
-    return Design(packing=tuple(packings), seed=seed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,20 +88,30 @@ class ViewFactorData:
     packing : (m,) int array
         Which packing a row comes from.
     packings : list of dict
-        Each packing's design and what came out (spheres, overlaps, missed share).
+        Each packing's design.
+    walls : ViewFactorData or None
+        Rows (sphere, wall) with the same packings, their markers those of the set ``wall``.
+    exchange : ViewFactorData or None
+        Rows (pair, emissivity) of exchange factors, their markers those of the set ``exchange``.
     digest : str
-        SHA-256 over all columns.
+        SHA-256 over all columns, those of walls and exchange included.
     """
 
     columns: dict[str, Array]
     packing: NDArray[np.int64]
     packings: list[dict[str, Any]]
+    walls: ViewFactorData | None = None
+    exchange: ViewFactorData | None = None
     digest: str = field(init=False)
 
     def __post_init__(self) -> None:
         digest = hashlib.sha256(np.ascontiguousarray(self.packing).tobytes())
-        for name in COLUMNS:
+        for name in sorted(self.columns):
+            digest.update(name.encode())
             digest.update(np.ascontiguousarray(self.columns[name]).tobytes())
+        for table in (self.walls, self.exchange):
+            if table is not None:
+                digest.update(table.digest.encode())
         object.__setattr__(self, "digest", digest.hexdigest())
 
     def __len__(self) -> int:
@@ -149,31 +139,50 @@ def reach_of(packing: Packing, least: float = LEAST_FACTOR) -> float:
 def rows_of(packing: Packing, emitters: int, rays: int, seed: int) -> dict[str, Array]:
     """Trace one packing and give a row for every pair (emitter, sphere in reach)."""
     rng = np.random.default_rng(seed)
-    who = np.sort(rng.choice(len(packing), min(emitters, len(packing)), replace=False))
+    # By surface: a bed of many small spheres and a few large ones must show both.
+    who = np.sort(
+        rng.choice(
+            len(packing), min(emitters, len(packing)), replace=False,
+            p=packing.areas / packing.areas.sum(),
+        )
+    )  # fmt: skip
     hood = neighbourhood(packing, reach_of(packing), who)
-    markers = pair_markers(packing, hood)
+    phi = inner_fraction(packing)
+    # Thinned by what is known before the trace, never by its outcome: first by a mean field,
+    # because most pairs in reach of large spheres are small ones that see nothing of each other.
+    r, owner = packing.radii, hood.owner
+    chord = 4.0 * (1.0 - phi) * (r**3).sum() / (r**2).sum() / (3.0 * phi)
+    touching = r[owner] + r[hood.sphere]
+    d = np.maximum(hood.distance, touching)
+    expected = r[hood.sphere] ** 2 / (4.0 * d**2) * np.exp((touching - d) / chord)
+    first = np.clip(expected / (0.2 * LEAST_FACTOR), LEAST_SHARE, 1.0)
+    choose = hood.within & (rng.random(len(d)) < first)
+    markers = pair_markers(packing, hood, choose, solid_fraction=phi)
     exact = pair_factor(markers.radius_over_distance, markers.radius_ratio)
-    # Thinned by what is known before the trace, never by its outcome; 0.03 because a pencil
-    # that is wholly blocked still lets a little through between its lines.
+    # Then by the pencil; 0.03 because one that is wholly blocked still lets a little through
+    # between its lines.
     expected = exact * (1.03 - markers.blocked_fraction)
     share = np.clip(expected / FULL_FACTOR, LEAST_SHARE, 1.0)
     keep = rng.random(len(share)) < share
     tally = trace(packing, rays=rays, seed=seed, emitters=who, images=True)
     # Tallies stand in the order (emitter, key): a binary search per emitter pairs them.
-    key = image_keys(hood.sphere, hood.image)[hood.within]
-    owner = hood.owner[hood.within]
+    key = image_keys(hood.sphere, hood.image)[choose]
+    owner = owner[choose]
+    error = sequence_error(tally.emitter, tally.count, tally.squares, rays, tally.replicates)
     hits = np.zeros(len(key), np.int64)
+    stderr = np.full(len(key), standard_error(0, rays))
     for i in who:
         mine = slice(*np.searchsorted(tally.emitter, [i, i + 1]))
         keys, counts = tally.key[mine], tally.count[mine]
         near = slice(*np.searchsorted(owner, [i, i + 1]))
         at = np.minimum(np.searchsorted(keys, key[near]), len(keys) - 1)
         hits[near] = np.where(keys[at] == key[near], counts[at], 0)
+        stderr[near] = np.where(keys[at] == key[near], error[mine][at], stderr[near])
     columns = {name: getattr(markers, name) for name in MARKERS} | {
         "exact": exact,
         "factor": hits / rays,
-        "stderr": standard_error(hits, rays),
-        "weight": 1.0 / share,
+        "stderr": stderr,
+        "weight": 1.0 / (share * first[choose]),
     }
     return {name: column[keep] for name, column in columns.items()}
 
@@ -182,6 +191,7 @@ def generate(
     design: Design,
     path: str | os.PathLike[str],
     *,
+    workers: int = 1,
     show_progress: bool = False,
     on_packing: Callable[[int], object] | None = None,
 ) -> ViewFactorData:
@@ -193,6 +203,8 @@ def generate(
         Packings, rays, seed.
     path : path
         The HDF5 file. Finished packings wait in ``PATH.parts`` until all are there.
+    workers : int
+        Processes; does not change the result.
     show_progress : bool
         Draw a progress bar.
     on_packing : callable, optional
@@ -202,36 +214,83 @@ def generate(
     -------
     ViewFactorData
     """
+    if workers < 1:
+        raise InputError(f"workers = {workers} [-] must be at least 1; mend it.")
     target = writable_file(path)
     parts = output_folder(target.with_name(target.name + ".parts"))
-    done = []
-    with progress(len(design.packing), "tracing packings", show=show_progress) as advance:
-        for number, entry in enumerate(design.packing):
-            seed = design.seed + 1000 * number
-            settings = json.dumps([asdict(entry), design.rays, design.emitters, seed, __version__])
-            name = hashlib.sha256(settings.encode()).hexdigest()[:16]
-            part = parts / f"{name}.npz"
-            columns = _kept(part)
-            if columns is None:
-                packing = random_packing(
-                    entry.count, entry.fraction, parse_sizes(entry.sizes), seed=seed,
-                    shake=entry.shake,
-                )  # fmt: skip
-                columns = rows_of(packing, design.emitters, design.rays, seed)
-                with atomic_path(part) as temporary:
-                    np.savez(temporary, **columns)  # type: ignore[arg-type]
-            done.append(columns)
+    jobs = [
+        (entry, design.emitters, design.rays, design.seed + 1000 * number, design.exchange, parts)
+        for number, entry in enumerate(design.packing)
+    ]
+    done: list[dict[str, Array]] = [{}] * len(jobs)
+    with (
+        progress(len(jobs), "tracing packings", show=show_progress) as advance,
+        _finished(jobs, workers) as finished,
+    ):
+        for number, columns in finished:
+            done[number] = columns
             advance(1)
             if on_packing is not None:
                 on_packing(number)
+    tables = [as_table(entry) for entry in design.packing]
     data = ViewFactorData(
-        {name: np.concatenate([part[name] for part in done]) for name in COLUMNS},
-        np.repeat(np.arange(len(done)), [len(part["factor"]) for part in done]),
-        [asdict(entry) for entry in design.packing],
+        *_joined(done, COLUMNS, ""),
+        tables,
+        ViewFactorData(*_joined(done, WALL_COLUMNS, "wall/"), tables),
+        ViewFactorData(*_joined(done, EXCHANGE_COLUMNS, "exchange/"), tables),
     )
     write(data, design, target)
     shutil.rmtree(parts, ignore_errors=True)
     return data
+
+
+def _joined(
+    done: list[dict[str, Array]], names: tuple[str, ...], prefix: str
+) -> tuple[dict[str, Array], NDArray[np.int64]]:
+    """Columns of all packings one after the other, and which packing each row is from."""
+    sizes = [len(part[f"{prefix}factor"]) for part in done]
+    columns = {name: np.concatenate([part[prefix + name] for part in done]) for name in names}
+    return columns, np.repeat(np.arange(len(done)), sizes)
+
+
+@contextmanager
+def _finished(
+    jobs: list[tuple[Bed, int, int, int, bool, Path]], workers: int
+) -> Iterator[Iterator[tuple[int, dict[str, Array]]]]:
+    """Numbers and columns of the packings, as they are finished."""
+    if workers == 1:
+        yield ((number, _one(*job)) for number, job in enumerate(jobs))
+        return
+    # Spawned, because a fork of a process with threads may hang.
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        numbers = {pool.submit(_one, *job): number for number, job in enumerate(jobs)}
+        try:
+            yield ((numbers[job], job.result()) for job in as_completed(numbers))
+        except BaseException:  # Ctrl-C must not wait for the packings that have not begun
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _one(
+    entry: Bed, emitters: int, rays: int, seed: int, exchange: bool, parts: Path
+) -> dict[str, Array]:
+    """Columns of one packing, made, or kept from a run that was stopped."""
+    settings = json.dumps([as_table(entry), rays, emitters, seed, exchange, __version__])
+    part = parts / f"{hashlib.sha256(settings.encode()).hexdigest()[:16]}.npz"
+    columns = _kept(part)
+    if columns is None:
+        packing = entry.packing(seed)
+        some = emitters_of(entry, emitters)
+        columns = rows_of(packing, some, rays, seed)
+        walls = wall_rows_of(packing, some, rays, seed)
+        columns |= {f"wall/{name}": column for name, column in walls.items()}
+        grey = {name: np.empty(0) for name in EXCHANGE_COLUMNS}
+        if exchange:
+            grey = exchange_rows_of(packing, some, rays, seed)
+        columns |= {f"exchange/{name}": column for name, column in grey.items()}
+        with atomic_path(part) as temporary:
+            np.savez(temporary, **columns)  # type: ignore[arg-type]
+    return columns
 
 
 def _kept(part: Path) -> dict[str, Array] | None:
@@ -239,7 +298,12 @@ def _kept(part: Path) -> dict[str, Array] | None:
     try:
         # Opened here, for numpy would leave a damaged file open.
         with open(part, "rb") as stream, np.load(stream, allow_pickle=False) as archive:
-            return {key: archive[key] for key in COLUMNS}
+            names = (
+                *COLUMNS,
+                *(f"wall/{name}" for name in WALL_COLUMNS),
+                *(f"exchange/{name}" for name in EXCHANGE_COLUMNS),
+            )
+            return {key: archive[key] for key in names}
     except Exception:  # absent, or cut as after a power failure: made again, with the same bits
         return None
 
@@ -248,18 +312,26 @@ def write(data: ViewFactorData, design: Design, path: Path) -> None:
     """Write a data set to HDF5, every column with its unit."""
     with atomic_path(path) as temporary, h5py.File(temporary, "w", libver="v110") as file:
         file.attrs["format"] = np.bytes_(FORMAT)
-        file.attrs["design"] = np.bytes_(json.dumps(asdict(design)))
+        tables = {"packing": data.packings}
+        settings = {"rays": design.rays, "emitters": design.emitters, "seed": design.seed}
+        settings["exchange"] = int(design.exchange)
+        file.attrs["design"] = np.bytes_(json.dumps(tables | settings))
         file.attrs["sha256"] = np.bytes_(data.digest)
         file.attrs["greybed"] = np.bytes_(__version__)
-        for name in COLUMNS:
-            column = file.create_dataset(
-                name, data=data.columns[name], compression="gzip", shuffle=True, fletcher32=True
-            )
-            column.attrs["units"] = np.bytes_("-")
-        packing = file.create_dataset(
-            "packing", data=data.packing.astype(np.int32), compression="gzip", fletcher32=True
+        _write_rows(file, data, COLUMNS)
+        if data.walls is not None:
+            _write_rows(file.create_group("wall"), data.walls, WALL_COLUMNS)
+        if data.exchange is not None:
+            _write_rows(file.create_group("exchange"), data.exchange, EXCHANGE_COLUMNS)
+
+
+def _write_rows(group: h5py.Group, data: ViewFactorData, names: tuple[str, ...]) -> None:
+    for name in (*names, "packing"):
+        values = data.packing.astype(np.int32) if name == "packing" else data.columns[name]
+        column = group.create_dataset(
+            name, data=values, compression="gzip", shuffle=True, fletcher32=True
         )
-        packing.attrs["units"] = np.bytes_("-")
+        column.attrs["units"] = np.bytes_("-")
 
 
 def read(path: str | os.PathLike[str]) -> ViewFactorData:
@@ -279,8 +351,9 @@ def read(path: str | os.PathLike[str]) -> ViewFactorData:
                 raise InputError(
                     f"{file}: not a view-factor data set; make one with greybed dataset viewfactor."
                 )
-            columns = {name: content[name][...] for name in COLUMNS}
-            packing = content["packing"][...].astype(np.int64)
+            columns, packing = _read_rows(content, COLUMNS)
+            wall = _read_rows(content["wall"], WALL_COLUMNS)
+            exchange = _read_rows(content["exchange"], EXCHANGE_COLUMNS)
             design = json.loads(content.attrs["design"])
             stored = content.attrs["sha256"].decode()
     except InputError:
@@ -290,9 +363,19 @@ def read(path: str | os.PathLike[str]) -> ViewFactorData:
             f"{file}: cannot read this data set ({shown(str(error), 80)}); copy it or make it "
             "again."
         ) from None
-    data = ViewFactorData(columns, packing, design["packing"])
+    tables = design["packing"]
+    data = ViewFactorData(
+        columns, packing, tables, ViewFactorData(*wall, tables), ViewFactorData(*exchange, tables)
+    )
     if data.digest != stored:
         raise InputError(
             f"{file}: the data do not match their SHA-256; copy the file again or make it again."
         )
     return data
+
+
+def _read_rows(
+    group: h5py.Group, names: tuple[str, ...]
+) -> tuple[dict[str, Array], NDArray[np.int64]]:
+    columns = {name: group[name][...] for name in names}
+    return columns, group["packing"][...].astype(np.int64)

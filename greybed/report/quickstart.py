@@ -18,7 +18,8 @@ from greybed.closures.artifact import SUFFIX
 from greybed.closures.viewfactor.bed import inner_fraction
 from greybed.closures.viewfactor.limits import check_limits
 from greybed.core.files import output_folder, write_summary
-from greybed.datasets.viewfactor import ViewFactorData, default_design, generate, read
+from greybed.datasets.beds import RandomBed
+from greybed.datasets.viewfactor import ViewFactorData, generate, quick_design, read
 from greybed.export import (
     CompiledClosure,
     OnnxClosure,
@@ -139,9 +140,9 @@ def _read_beds() -> Result:
 
 
 def _dataset(folder: Path, seed: int, small: bool) -> Result:
-    design = default_design(seed)
+    design = quick_design(seed)
     if small:
-        few = [replace(p, count=120) for p in design.packing[::3]]
+        few = [replace(p, count=120) for p in design.packing[::3] if isinstance(p, RandomBed)]
         for split, k in (("calibrate", -2), ("test", -1)):
             few[k] = replace(few[k], split=split, fraction=0.4)
         design = replace(design, packing=tuple(few), rays=4_000, emitters=20)
@@ -155,7 +156,7 @@ def _dataset(folder: Path, seed: int, small: bool) -> Result:
             s: sum(p["split"] == s for p in data.packings) for s in ("train", "calibrate", "test")
         },
         "fractions": sorted({p.fraction for p in design.packing}),
-        "sizes": sorted({p.sizes for p in design.packing}),
+        "sizes": sorted({p.sizes for p in design.packing if isinstance(p, RandomBed)}),
         "data_sha256": data.digest,
         "seconds": time.perf_counter() - begin,
         "design": [asdict(p) for p in design.packing],

@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 
 HIDDEN = (24, 24)
 BATCH = 8192
+LEAST_BATCH = 256
 LEARNING_RATE = 4e-3
 
 
@@ -52,6 +53,8 @@ def fit_network(
         mean, scale = train.features.mean(axis=0), train.features.std(axis=0)
         # A feature that never varies, as the solid fraction of a single packing, says nothing.
         scale = np.where(scale > 1e-12 * (1.0 + np.abs(mean)), scale, 1.0)
+        # No correction to begin with: what the rows say nothing of stays at the baseline.
+        start.weights[-1][:, 0] = 0.0
         weights = [torch.tensor(w, requires_grad=True) for w in start.weights]
         biases = [torch.tensor(b, requires_grad=True) for b in start.biases]
         _fit_value(train, mean, scale, weights, biases, seed, epochs, on_epoch)
@@ -105,7 +108,8 @@ def _fit_value(
     t = _tensors(rows, mean, scale)
     generator = torch.Generator().manual_seed(seed)
     optimiser = torch.optim.Adam([*weights, *biases], lr=LEARNING_RATE)
-    batches = max(1, -(-len(rows) // BATCH))
+    # Few rows in smaller batches: a fit needs steps, not only rows.
+    batches = max(1, min(len(rows) // LEAST_BATCH, 8), -(-len(rows) // BATCH))
     schedule = torch.optim.lr_scheduler.OneCycleLR(
         optimiser, LEARNING_RATE, total_steps=epochs * batches
     )

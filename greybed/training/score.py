@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from greybed.closures.viewfactor import ViewFactorClosure
 from greybed.datasets.viewfactor import ViewFactorData
+from greybed.training.regimes import own_error
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,8 @@ def score(
     -------
     dict
         ``r2`` (pairs with F > 1e-4) with ``r2_ci95`` over packings, ``r2_noise`` (what a perfect
-        closure would reach), ``rmse``, ``mae``, ``bias``, ``mape_above_1e-2``,
+        closure would reach), ``rmse``, ``rmse_own`` (the trace's ``noise`` taken out), ``mae``,
+        ``bias``, ``mape_above_1e-2``,
         ``mape_above_1e-3``, ``negative``, ``above_exact``, ``unobstructed_error`` (against the
         exact factor), ``coverage95`` (closure's and trace's errors together),
         ``extrapolated``, and counts.
@@ -50,10 +52,11 @@ def score(
     rows = data.in_split(split)
     c = {name: column[rows] for name, column in data.columns.items()}
     packing = data.packing[rows]
-    p = closure.predict(**{name: c[name] for name in closure.marker_names})
+    m = {name: c[name] for name in closure.marker_names}
+    p = closure.predict(**m)
     predicted, truth, exact = p.view_factor, c["factor"], c["exact"]
     big = truth > LEAST
-    free = c["n_between"] == 0.0
+    free = closure.markers.gate(m) == 0.0
     error = predicted - truth
     sigma = np.hypot(p.stderr, c["stderr"])
     w = c["weight"]
@@ -67,6 +70,8 @@ def score(
             np.average(c["stderr"][big] ** 2, weights=w[big]) / np.cov(truth[big], aweights=w[big])
         ),
         "rmse": float(np.sqrt(np.average(error[big] ** 2, weights=w[big]))),
+        "rmse_own": own_error(error[big], c["stderr"][big], w[big]),
+        "noise": float(np.sqrt(np.average(c["stderr"][big] ** 2, weights=w[big]))),
         "mae": float(np.average(np.abs(error[big]), weights=w[big])),
         "bias": float(np.average(error[big], weights=w[big])),
         "negative": int((predicted < 0.0).sum()),

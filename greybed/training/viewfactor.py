@@ -7,17 +7,29 @@ from typing import Any
 import numpy as np
 
 from greybed._version import __version__
-from greybed.closures.viewfactor import MARKER_SETS, ViewFactorClosure
+from greybed.closures.viewfactor import MARKER_SETS, MarkerSet, ViewFactorClosure
 from greybed.closures.viewfactor.closure import Domain
 from greybed.closures.viewfactor.limits import check_limits
 from greybed.core import InputError
 from greybed.core.progress import progress
-from greybed.datasets.viewfactor import MOST_SEED, SPLITS, ViewFactorData
+from greybed.datasets.beds import SPLITS
+from greybed.datasets.viewfactor import MOST_SEED, ViewFactorData
+from greybed.training.regimes import regimes
 from greybed.training.rows import Rows
 from greybed.training.score import score
 
 MOST_ROWS = 250_000
 MOST_EPOCHS = 100_000
+
+
+def rows_for(data: ViewFactorData, markers: MarkerSet) -> ViewFactorData:
+    """The rows of a data set that a marker set is for: pairs of spheres, or spheres and walls."""
+    if markers.quantity == "viewfactor":
+        return data
+    rows = data.walls if markers.quantity == "wallfactor" else data.exchange
+    nothing = {name: np.empty(0) for name in (*markers.names, "exact", "factor", "stderr")}
+    none = ViewFactorData(nothing, np.empty(0, np.int64), data.packings)
+    return none if rows is None else rows
 
 
 def train(
@@ -38,7 +50,8 @@ def train(
     kind : str
         ``mlp`` or ``forest``.
     markers : str
-        ``pencil`` or ``published``.
+        ``pencil`` or ``published`` for pairs of spheres, ``wall`` for spheres and walls,
+        ``exchange`` for exchange factors of pairs.
     seed : int
         Seed of the fit.
     epochs : int
@@ -55,13 +68,16 @@ def train(
         raise InputError(f"seed = {seed} [-] must lie in 0 ... {MOST_SEED}; mend it.")
     if not 1 <= epochs <= MOST_EPOCHS:
         raise InputError(f"epochs = {epochs} [-] must lie in 1 ... {MOST_EPOCHS}; mend it.")
+    marker_set = MARKER_SETS[markers]
+    data, beds = rows_for(data, marker_set), ""
+    if marker_set.quantity == "wallfactor":
+        beds = "walled "
     for split in SPLITS:
         if data.in_split(split).sum() < 100:
             raise InputError(
-                f"the data set has {int(data.in_split(split).sum())} rows in the split "
-                f"{split!r}, at least 100 are needed; add packings with split = {split!r}."
+                f"the data set has {int(data.in_split(split).sum())} {beds}rows in the split "
+                f"{split!r}, at least 100 are needed; add {beds}packings with split = {split!r}."
             )
-    marker_set = MARKER_SETS[markers]
     fitted = Rows.of(data, marker_set, "train", MOST_ROWS, seed)
     held = Rows.of(data, marker_set, "calibrate", MOST_ROWS, seed)
     predictor: Any
@@ -78,13 +94,14 @@ def train(
     closure = ViewFactorClosure(marker_set, predictor, Domain.of(fitted.features))
     closure.card.update(
         {
-            "title": f"view factor, {kind}, {markers} markers",
+            "title": f"{marker_set.quantity}, {kind}, {markers} markers",
             "data_sha256": data.digest,
             "seed": seed,
             "greybed": __version__,
             "packings": {s: sum(p["split"] == s for p in data.packings) for s in SPLITS},
             "solid_fractions": sorted({float(p["fraction"]) for p in data.packings}),
-            "sizes": sorted({str(p["sizes"]) for p in data.packings}),
+            "sizes": sorted({str(p.get("sizes", "mono")) for p in data.packings}),
+            "kinds": sorted({str(p.get("kind", "random")) for p in data.packings}),
             "ranges": {
                 name: [float(low), float(high)]
                 for name, low, high in zip(
@@ -96,6 +113,7 @@ def train(
             },
             "rows": len(fitted),
             "score": score(closure, data),
+            "regimes": regimes(closure, data),
             "limits": {case.name: case.error for case in check_limits(closure)},
         }
     )

@@ -27,7 +27,9 @@ FLAGS = {
     "O3 native": ("-std=c++17", "-O3", "-march=native", *WARNINGS),
     "O3 native fast-math": ("-std=c++20", "-O3", "-march=native", "-ffast-math", *WARNINGS),
 }
-UNTRAINED = [f"{kind} {markers} 3" for kind in ("mlp", "forest") for markers in MARKER_SETS]
+# Closures of pairs: those to walls and of exchange have no exported form.
+PAIRS = [name for name, markers in MARKER_SETS.items() if markers.quantity == "viewfactor"]
+UNTRAINED = [f"{kind} {markers} 3" for kind in ("mlp", "forest") for markers in PAIRS]
 # Weights that bend the odds far down, and a pair that is hardly visible.
 HARD = {
     "mlp published 0": {

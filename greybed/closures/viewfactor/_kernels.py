@@ -16,6 +16,22 @@ def _smooth(x):
 
 
 @njit(**_OPTIONS)
+def _shared(a, b, s):
+    """Area that two discs of radii a and b share, their centres s apart."""
+    if s >= a + b:
+        return 0.0
+    if s <= abs(a - b):
+        return math.pi * min(a, b) ** 2
+    x = (s * s + a * a - b * b) / (2.0 * s)
+    y = s - x
+    return (
+        a * a * math.acos(min(max(x / a, -1.0), 1.0))
+        + b * b * math.acos(min(max(y / b, -1.0), 1.0))
+        - s * math.sqrt(max(a * a - x * x, 0.0))
+    )
+
+
+@njit(**_OPTIONS)
 def _basis(x, y, z):
     """Two unit vectors across a unit vector (Duff et al. 2017, jcgt.org/published/0006/01/01)."""
     sign = math.copysign(1.0, z)
@@ -82,7 +98,7 @@ def _pencil(r_a, r_b, axis, d, lines, edge, found, blockers, radii, gates):
 
 @njit(**_OPTIONS)
 def between(r_i, r_j, delta, near, near_radii, near_distance, largest, lines, edge, scratch, work):
-    """Markers of one pair: (spheres between, blocked share, blockers per line).
+    """Markers of one pair: (spheres between whole, by cover, blocked share, blockers per line).
 
     ``delta`` is the vector from i to j; ``near`` (m, 3) the neighbours of i relative to it, by
     growing distance. A sphere stands between where it reaches into the convex hull of i and j,
@@ -92,7 +108,7 @@ def between(r_i, r_j, delta, near, near_radii, near_distance, largest, lines, ed
     ax, ay, az = delta[0] / d, delta[1] / d, delta[2] / d
     tilt = (r_i - r_j) / d
     lean = math.sqrt(max(1.0 - tilt * tilt, 0.0))
-    found = 0
+    found, cover = 0, 0.0
     widest = max(r_i, r_j)
     for k in range(near_distance.size):
         # The hull ends at j; what lies further away than that cannot reach into it.
@@ -106,7 +122,9 @@ def between(r_i, r_j, delta, near, near_radii, near_distance, largest, lines, ed
         reach = widest + near_radii[k]
         if rho2 >= reach * reach:
             continue
-        depth = near_radii[k] + r_i - math.sqrt(max(rho2, 0.0)) * lean - along * tilt
+        # Radius of the hull there and the sphere's way off its axis, across the hull's surface.
+        hull, away = r_i - along * tilt, math.sqrt(max(rho2, 0.0)) * lean
+        depth = near_radii[k] + hull - away
         if depth <= 0.0:
             continue
         if (x - delta[0]) ** 2 + (y - delta[1]) ** 2 + (z - delta[2]) ** 2 < 1e-12 * d * d:
@@ -116,9 +134,10 @@ def between(r_i, r_j, delta, near, near_radii, near_distance, largest, lines, ed
         scratch[found, 0], scratch[found, 1], scratch[found, 2] = x, y, z
         work[found, 0] = near_radii[k]
         work[found, 1] = _smooth(depth / (2.0 * edge * near_radii[k]))
+        cover += _shared(hull, near_radii[k], away) / (math.pi * hull * hull)
         found += 1
     if found == 0:
-        return 0, 0.0, 0.0
+        return 0, 0.0, 0.0, 0.0
     # One order of the pair for both directions: the marker must not depend on who asks.
     if r_i != r_j:
         keep = r_i < r_j
@@ -140,13 +159,13 @@ def between(r_i, r_j, delta, near, near_radii, near_distance, largest, lines, ed
         blocked, met = _pencil(
             r_j, r_i, (-ax, -ay, -az), d, lines, edge, found, scratch, work[:, 0], work[:, 1]
         )
-    return found, blocked, met
+    return found, cover, blocked, met
 
 
 @njit(**_OPTIONS)
 def pairs_between(
     emitters, target, start, near, near_radii, near_distance, near_start, radii, lines, edge,
-    count, blocked, met,
+    count, cover, blocked, met,
 ):  # fmt: skip
     """Markers of the pairs (emitters[e], neighbour target[m]), m in start[e]:start[e + 1].
 
@@ -159,7 +178,7 @@ def pairs_between(
         a, b = near_start[e], near_start[e + 1]
         for m in range(start[e], start[e + 1]):
             j = a + target[m]
-            count[m], blocked[m], met[m] = between(
+            count[m], cover[m], blocked[m], met[m] = between(
                 radii[emitters[e]], near_radii[j], near[j], near[a:b], near_radii[a:b],
                 near_distance[a:b], largest, lines, edge, scratch, work,
             )  # fmt: skip
@@ -167,7 +186,7 @@ def pairs_between(
 
 @njit(**_OPTIONS)
 def free_lines(
-    emitters, vector, near_radii, start, directions, offsets, length, edge, through
+    emitters, vector, near_radii, start, stop, directions, offsets, length, edge, through
 ):  # fmt: skip
     """Share of each line that gets past the neighbours, ``through`` (e, n_lines).
 
@@ -179,7 +198,7 @@ def free_lines(
             wx, wy, wz = directions[e, m, 0], directions[e, m, 1], directions[e, m, 2]
             ox, oy, oz = offsets[e, m, 0], offsets[e, m, 1], offsets[e, m, 2]
             share = 1.0
-            for k in range(start[e], start[e + 1]):
+            for k in range(start[e], stop[e]):
                 bx, by, bz = vector[k, 0] - ox, vector[k, 1] - oy, vector[k, 2] - oz
                 t = bx * wx + by * wy + bz * wz
                 if t <= 0.0 or t >= length[e, m]:

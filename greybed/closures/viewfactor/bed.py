@@ -9,22 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from greybed.closures.viewfactor import _kernels
-from greybed.closures.viewfactor.markers import RIM, golden_steps, pair_markers
-from greybed.closures.viewfactor.neighbourhood import Neighbourhood, neighbourhood
-from greybed.core import Cylinder, Packing, Plane, RangeError, Wall
-from greybed.core.patches import bounded, ray_distances
+from greybed.closures.viewfactor.exact import pair_factor
+from greybed.closures.viewfactor.markers import pair_markers
+from greybed.closures.viewfactor.neighbourhood import neighbourhood
+from greybed.closures.viewfactor.walls import WallMarkers, wall_markers
+from greybed.core import Packing, RangeError
 
 if TYPE_CHECKING:
     from greybed.closures.viewfactor.closure import ViewFactorClosure
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 # Reach of the pair sum where nothing else is asked for, in mean radii: at solid fractions of
 # settled beds the pairs beyond it hold less than one percent of a row.
 REACH = 10.0
-# Lines along which a sphere looks for walls.
-N_LINES = 128
+CHORDS = 4.0
+# Beyond it pairs are counted in a mean field, down to this share of light and up to this reach.
+UNSEEN = 5e-3
+FAR_REACH = 40.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +59,7 @@ def bed_factors(
     closure: ViewFactorClosure,
     packing: Packing,
     *,
+    wall_closure: ViewFactorClosure | None = None,
     reach: float | None = None,
     solid_fraction: float | None = None,
 ) -> BedFactors:
@@ -67,8 +71,11 @@ def bed_factors(
         The closure.
     packing : Packing
         The bed, with its walls.
+    wall_closure : ViewFactorClosure, optional
+        Closure on the markers ``wall``; without it the free share of the lines is taken as it is.
     reach : float, optional
-        Largest distance between the centres of a pair [m]; 10 mean radii by default.
+        Largest distance between the centres of a pair [m]. By default 10 mean radii for the
+        closure, and a mean field, F_exact exp(-gap / mean chord), for pairs further apart.
     solid_fraction : float, optional
         Solid fraction inside the bed [-]; measured by default (see :func:`inner_fraction`).
 
@@ -78,16 +85,16 @@ def bed_factors(
 
     Notes
     -----
-    Walls and openings are seen along 128 fixed lines a sphere, blocked by the real neighbours: a
-    geometric estimate with about 0.02 error a sphere, not a learnt one, that averages out over
-    the bed. Rows add up to one within the errors; balance them before use (the thermal bed does).
+    Each wall's exact free share is multiplied with its visibility along 4096 fixed lines a
+    sphere, blocked by the real neighbours; the opening is what those lines see of it. Rows add up
+    to one within the errors; :meth:`ViewFactorClosure.factors` balances them.
     """
-    size = REACH * float(packing.radii.mean()) if reach is None else reach
-    if not (np.isfinite(size) and size > 0.0):
-        raise RangeError(f"reach = {size:g} [m] must be finite and above 0; leave it out for 10 r.")
     phi = inner_fraction(packing) if solid_fraction is None else solid_fraction
     if not 0.0 < phi < 1.0:
         raise RangeError(f"solid_fraction = {phi:g} [-] must lie in (0, 1); check the packing.")
+    size = near_reach(packing, phi) if reach is None else float(reach)
+    if not (np.isfinite(size) and size > 0.0):
+        raise RangeError(f"reach = {size:g} [m] must be finite and above 0; leave it out for 10 r.")
     hood = neighbourhood(packing, size)
     owner = hood.owner
     if (hood.distance == 0.0).any():
@@ -109,20 +116,72 @@ def bed_factors(
     i, j = owner[once], hood.sphere[once]
     areas = packing.areas
     exchange = areas[i] * predicted.view_factor
+    if reach is None:
+        far = _far_pairs(packing, size, phi)
+        i, j = np.concatenate([i, far[0]]), np.concatenate([j, far[1]])
+        exchange = np.concatenate([exchange, far[2]])
     n = len(packing)
     both = sparse.coo_array(
         (np.concatenate([exchange, exchange]), (np.concatenate([i, j]), np.concatenate([j, i]))),
         shape=(n, n),
     )
     factors = sparse.csr_array(sparse.diags_array(1.0 / areas) @ both.tocsr())
-    shares = boundary_shares(packing, hood, size, phi)
+    if all(packing.periodic):
+        walls, opening = np.zeros((n, 0)), np.zeros(n)
+    else:
+        walls, opening = _wall_factors(wall_markers(packing, hood, size, phi), wall_closure)
     return BedFactors(
         factors,
-        shares[:, : packing.n_walls],
-        shares[:, packing.n_walls],
+        walls,
+        opening,
         areas,
         float(predicted.extrapolates.mean()) if len(i) else 0.0,
     )
+
+
+def mean_chord(packing: Packing, solid_fraction: float) -> float:
+    """Mean length of free lines between the spheres, 4 (1 - phi) r32 / (3 phi) [m]."""
+    r = packing.radii
+    r32 = float((r**3).sum() / (r**2).sum())
+    return 4.0 * (1.0 - solid_fraction) * r32 / (3.0 * solid_fraction)
+
+
+def near_reach(packing: Packing, phi: float) -> float:
+    """Distance up to which pairs are evaluated one by one [m]: longer where the bed is open."""
+    mean = float(packing.radii.mean())
+    return float(
+        np.clip(2.0 * mean + CHORDS * mean_chord(packing, phi), REACH * mean, 2.0 * REACH * mean)
+    )
+
+
+def _far_pairs(packing: Packing, near: float, phi: float) -> tuple[Index, Index, Array]:
+    """Pairs beyond ``near``, each once, and their exchange areas A_i F_ij [m2] in a mean field.
+
+    F = F_exact exp(-gap / chord): so far apart there are so many spheres in between that their
+    places do not matter. Pairs that less than UNSEEN of the light reaches are left out.
+    """
+    chord, largest = mean_chord(packing, phi), float(packing.radii.max())
+    far = min(2.0 * largest + chord * np.log(1.0 / UNSEEN), FAR_REACH * float(packing.radii.mean()))
+    if far <= near:
+        return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
+    hood = neighbourhood(packing, far)
+    owner, sphere = hood.owner, hood.sphere
+    chosen = hood.within & (hood.distance > near) & (owner <= sphere)
+    i, j, d = owner[chosen], sphere[chosen], hood.distance[chosen]
+    r_i, r_j = packing.radii[i], packing.radii[j]
+    factor = pair_factor(r_j / d, r_j / r_i) * np.exp(-(d - r_i - r_j) / chord)
+    # A sphere and its own image stand in the list in both directions.
+    return i, j, packing.areas[i] * factor * np.where(i == j, 0.5, 1.0)
+
+
+def _wall_factors(m: WallMarkers, closure: ViewFactorClosure | None) -> tuple[Array, Array]:
+    """Factors to walls, (n, n_walls), and to the opening, (n,) [-]."""
+    if closure is None:
+        return m.wall_share * (1.0 - m.blocked_fraction), m.opening
+    # A wall that no line reaches: no share at all, and the closure's factor needs some.
+    share = np.maximum(m.wall_share, 1e-12)
+    markers = {**vars(m), "wall_share": share}
+    return closure.evaluate(**{name: markers[name] for name in closure.marker_names}), m.opening
 
 
 def inner_fraction(packing: Packing) -> float:
@@ -166,86 +225,3 @@ def _common_volume(ball: float, radii: Array, distance: Array) -> Array:
     around = distance <= radii - ball
     apart = np.where(outside, 0.0, np.where(around, 4.0 / 3.0 * np.pi * ball**3, lens))
     return np.where(inside, whole, apart)
-
-
-def boundary_shares(
-    packing: Packing, hood: Neighbourhood, reach: float, solid_fraction: float
-) -> Array:
-    """View of every wall and, last, of the opening, shape (n, n_walls + 1) [-]."""
-    n, shares = len(packing), np.zeros((len(packing), packing.n_walls + 1))
-    if all(packing.periodic):
-        return shares
-    r = packing.radii
-    chord = 4.0 * (1.0 - solid_fraction) * (r**3).sum() / (r**2).sum() / (3.0 * solid_fraction)
-    directions, offsets = _leaving_lines(n)
-    offsets *= r[:, None, None]
-    origin = packing.centres[:, None, :] + offsets
-    length = np.full((n, N_LINES), np.inf)
-    hit = np.full((n, N_LINES), packing.n_walls)
-    for w, wall in enumerate(packing.walls):
-        t = _distance(origin, directions, wall)
-        if bounded(wall):
-            # As behind a plane: what starts beyond the wall has met it.
-            middle = np.broadcast_to(packing.centres[:, None, :], offsets.shape)
-            t[_distance(middle, offsets / r[:, None, None], wall) < r[:, None]] = 0.0
-        nearer = t < length
-        length, hit = np.where(nearer, t, length), np.where(nearer, w, hit)
-    through = np.empty((n, N_LINES))
-    _kernels.free_lines(
-        hood.emitters, hood.vector, r[hood.sphere], hood.start, directions, offsets, length, RIM,
-        through,
-    )  # fmt: skip
-    # Beyond reach the bed is a mean field; beyond the spheres' own extent the way is free.
-    low, high = (
-        (packing.centres - r[:, None]).min(axis=0),
-        (packing.centres + r[:, None]).max(axis=0),
-    )
-    with np.errstate(divide="ignore", invalid="ignore"):
-        out = np.where(directions > 0.0, (high - origin) / directions, (low - origin) / directions)
-    out = np.where(packing.periodic, np.inf, np.nan_to_num(out, nan=np.inf)).min(axis=2)
-    unseen = np.maximum(np.minimum(length, out) - reach, 0.0)
-    through *= np.exp(-unseen / chord)
-    np.add.at(shares, (np.arange(n)[:, None], hit), through / N_LINES)
-    return shares
-
-
-def _leaving_lines(n: int) -> tuple[Array, Array]:
-    """Directions and starting points (n, 128, 3) of lines that leave unit spheres evenly.
-
-    The same lattice of lines for every sphere, shifted by an irrational step from one to the
-    next, so that what the lattice misses at one sphere is made up for by the others.
-    """
-    steps = golden_steps(4)
-    shift = (np.arange(n)[:, None] * np.sqrt([2.0, 3.0, 5.0, 7.0])) % 1.0
-    u = (np.arange(N_LINES)[:, None] * steps + shift[:, None, :]) % 1.0
-    polar = 1.0 - 2.0 * u[..., 0]
-    across = np.sqrt(np.maximum(1.0 - polar**2, 0.0))
-    turn = 2.0 * np.pi * u[..., 1]
-    d = np.stack([across * np.cos(turn), across * np.sin(turn), polar], axis=-1)
-    # A point of the disc across the line, lifted to the sphere: a cosine law at its surface.
-    e1 = np.stack([-np.sin(turn), np.cos(turn), np.zeros_like(turn)], axis=-1)
-    e2 = np.cross(d, e1)
-    radius, angle = np.sqrt(u[..., 2])[..., None], 2.0 * np.pi * u[..., 3][..., None]
-    lift = np.sqrt(1.0 - radius**2)
-    return d, radius * (np.cos(angle) * e1 + np.sin(angle) * e2) + lift * d
-
-
-def _distance(origin: Array, d: Array, wall: Wall) -> Array:
-    """Distance from points along directions, (..., 3) each, to a wall; inf if not ahead [m]."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        if isinstance(wall, Plane):
-            normal = np.array(wall.normal)
-            towards = d @ normal
-            t = np.maximum(-((origin - np.array(wall.point)) @ normal) / towards, 0.0)
-            return np.where(towards < 0.0, t, np.inf)
-        if not isinstance(wall, Cylinder) or bounded(wall):
-            flat = ray_distances(wall, origin.reshape(-1, 3), d.reshape(-1, 3))
-            return flat.reshape(d.shape[:-1])
-        axis = np.array(wall.axis)
-        offset = origin - np.array(wall.point)
-        u = d - (d @ axis)[..., None] * axis
-        q = offset - (offset @ axis)[..., None] * axis
-        a, b = (u**2).sum(axis=-1), (q * u).sum(axis=-1)
-        c = (q**2).sum(axis=-1) - wall.radius**2
-        t = (np.sqrt(np.maximum(b * b - a * c, 0.0)) - b) / a
-        return np.where(a > 1e-24, np.maximum(t, 0.0), np.inf)

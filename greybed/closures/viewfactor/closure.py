@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from greybed.closures.predictors import PREDICTORS, Predictor
-from greybed.closures.viewfactor.exact import TOUCHING, pair_factor
+from greybed.closures.viewfactor.exact import TOUCHING
 from greybed.closures.viewfactor.visibility import (
     MARKER_SETS,
     MarkerSet,
@@ -20,6 +20,7 @@ from greybed.core import Packing, RangeError
 
 if TYPE_CHECKING:
     from greybed.closures.viewfactor.bed import BedFactors
+    from greybed.core.rows import Rows
 
 Array = NDArray[np.float64]
 
@@ -136,8 +137,6 @@ class ViewFactorClosure:
     domain: Domain
     card: dict[str, Any] = field(default_factory=dict)
 
-    quantity = "viewfactor"
-
     @classmethod
     def untrained(
         cls, kind: str = "mlp", markers: str = "pencil", seed: int = 0
@@ -147,6 +146,11 @@ class ViewFactorClosure:
         n = len(marker_set.feature_names)
         predictor = PREDICTORS[kind].random(n, seed=seed)
         return cls(marker_set, predictor, Domain.everywhere(n))
+
+    @property
+    def quantity(self) -> str:
+        """``viewfactor`` between spheres, ``wallfactor`` to a wall, or ``exchange`` factor."""
+        return self.markers.quantity
 
     @property
     def kind(self) -> str:
@@ -192,7 +196,7 @@ class ViewFactorClosure:
         gate = self.markers.gate(flat)
         raw = self.predictor(features)
         share = unblocked_share(self.kind, self.markers.baseline(flat), raw[:, 0])
-        exact = pair_factor(flat["radius_over_distance"], flat["radius_ratio"])
+        exact = self.markers.exact(flat)
         # A sum of two positive parts: 1 - gate (1 - share) would cancel where little is visible,
         # and with it reciprocity.
         factor = exact * ((1.0 - gate) + gate * share)
@@ -205,6 +209,33 @@ class ViewFactorClosure:
         from greybed.closures.viewfactor.bed import bed_factors
 
         return bed_factors(self, packing, **options)
+
+    def factors(self, packing: Packing, **options: Any) -> Rows:
+        """View factors of a whole bed, balanced: reciprocal, and every row sums to one.
+
+        Parameters
+        ----------
+        packing : Packing
+            The bed, with its walls.
+        **options
+            Those of :func:`greybed.closures.viewfactor.bed.bed_factors`: ``wall_closure``,
+            ``reach`` [m], ``solid_fraction`` [-].
+
+        Returns
+        -------
+        Rows
+            ``factors`` (n, n) sparse, ``wall_factors`` (n, n_walls), ``escaped`` (n,) [-] and
+            ``areas`` (n,) [m2], ready for :class:`greybed.coupling.ThermalBed`.
+
+        Raises
+        ------
+        InputError
+            If no scaling closes the rows.
+        """
+        from greybed.core.rows import Rows, balanced
+
+        bed = self.bed_factors(packing, **options)
+        return balanced(Rows.of(bed, packing))
 
     def _checked(self, markers: dict[str, ArrayLike]) -> dict[str, Array]:
         wanted, given = set(self.marker_names), set(markers)
@@ -228,6 +259,8 @@ class ViewFactorClosure:
                     f"{'(' if marker.low_open else '['}{marker.low:g}, {marker.high:g}]; "
                     "check how the markers were made."
                 )
+        if self.quantity == "wallfactor":
+            return m
         x = m["radius_over_distance"]
         reach = x * (1.0 + 1.0 / m["radius_ratio"])
         deep = reach > 1.0 / (1.0 - TOUCHING)

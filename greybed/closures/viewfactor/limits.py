@@ -96,7 +96,9 @@ def check_limits(
     """
     law = closure.evaluate if evaluate is None else evaluate
     markers = random_markers(closure, n, seed)
-    exact = pair_factor(markers["radius_over_distance"], markers["radius_ratio"])
+    exact = closure.markers.exact(markers)
+    if closure.quantity == "exchange":
+        return _exchange_cases(law, markers, rounding)
     free = _free(closure, markers)
     factor = law(**markers)
     unobstructed = law(**free)
@@ -107,6 +109,8 @@ def check_limits(
             "F <= F_exact: largest excess", max(_highest(factor / exact - 1.0), 0.0), rounding
         ),
     ]
+    if closure.quantity == "wallfactor":
+        return [*cases, *_wall_cases(law, free, rounding)]
     back = law(**_swapped(markers))
     ratio2 = markers["radius_ratio"] ** 2  # A_j / A_i
     cases.append(
@@ -130,6 +134,33 @@ def check_limits(
             LimitCase("no jump in distance: step ratio when halved", _jump(closure, law, seed), 0.6)
         )
     return cases
+
+
+def _exchange_cases(law: Evaluate, markers: dict[str, Array], rounding: float) -> list[LimitCase]:
+    factor, one = law(**markers), np.ones_like(markers["emissivity"])
+    black = law(**{**markers, "emissivity": one})
+    free = pair_factor(markers["radius_over_distance"], markers["radius_ratio"])
+    view = markers["visible_share"] * free
+    back = law(**_swapped(markers)) * markers["radius_ratio"] ** 2
+    return [
+        LimitCase("emissivity 1: D = F", _largest(black - view), rounding),
+        LimitCase("D > 0: share of pairs that violate it", _share(~(factor > 0.0)), 0.0),
+        LimitCase("D < 1: share of pairs that violate it", _share(~(factor < 1.0)), 0.0),
+        LimitCase("D >= e F: largest lack",
+                  _highest(markers["emissivity"] * view - factor), rounding),
+        # What is small is what reflections leave of a bound of order one.
+        LimitCase("reciprocity A_i e D_ij = A_j e D_ji", _largest(back / factor - 1.0),
+                  1e4 * rounding),
+    ]  # fmt: skip
+
+
+def _wall_cases(law: Evaluate, free: dict[str, Array], rounding: float) -> list[LimitCase]:
+    plane = law(**{**free, "wall_share": np.full_like(free["wall_share"], 0.5)})
+    everything = law(**{**free, "wall_share": np.ones_like(free["wall_share"])})
+    return [
+        LimitCase("infinite plane, nothing between: 1/2", _largest(2.0 * plane - 1.0), rounding),
+        LimitCase("wall all around, nothing between: 1", _largest(everything - 1.0), rounding),
+    ]
 
 
 def _largest(error: Array) -> float:

@@ -35,7 +35,10 @@ class PairMarkers:
     radius_ratio : (m,) float
         r_j / r_i, above 0 [-].
     n_between : (m,) float
-        Spheres that reach into the convex hull of i and j beside their axis [-].
+        Spheres between i and j, each counted by the share of the section of their convex hull
+        that it covers; 0 exactly where none reaches into the hull [-].
+    whole_between : (m,) float
+        The same spheres, each counted as one [-].
     blocked_fraction : (m,) float
         Share of a fixed pencil of lines between i and j that is blocked, 0 to 1 [-].
     blockers_per_line : (m,) float
@@ -47,6 +50,7 @@ class PairMarkers:
     radius_over_distance: Array
     radius_ratio: Array
     n_between: Array
+    whole_between: Array
     blocked_fraction: Array
     blockers_per_line: Array
     solid_fraction: Array
@@ -109,7 +113,7 @@ def pair_markers(
     chosen = np.flatnonzero(hood.within if choose is None else hood.within & choose)
     owner = np.repeat(np.arange(len(hood.emitters)), np.diff(hood.start))[chosen]
     count = np.empty(len(chosen), np.int64)
-    blocked, met = np.empty(len(chosen)), np.empty(len(chosen))
+    cover, blocked, met = (np.empty(len(chosen)) for _ in range(3))
     first = np.searchsorted(owner, np.arange(len(hood.emitters) + 1))
     target = chosen - hood.start[owner]
     radii = packing.radii[hood.sphere]
@@ -120,7 +124,7 @@ def pair_markers(
         _kernels.pairs_between(
             hood.emitters[block], target[a:b], first[span] - a, hood.vector, radii,
             hood.distance, hood.start[span], packing.radii, pencil_lines(), RIM,
-            count[a:b], blocked[a:b], met[a:b],
+            count[a:b], cover[a:b], blocked[a:b], met[a:b],
         )  # fmt: skip
 
     # Each emitter fills its own part: the threads change no bit.
@@ -135,6 +139,7 @@ def pair_markers(
     return PairMarkers(
         r_j / distance,
         r_j / r_i,
+        cover,
         count.astype(np.float64),
         blocked,
         met,

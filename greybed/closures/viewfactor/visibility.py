@@ -16,6 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from greybed.closures.viewfactor.exact import pair_factor
+
 Array = NDArray[np.float64]
 Markers = dict[str, Array]
 
@@ -53,7 +55,7 @@ class Marker:
 OVER_DISTANCE = Marker("radius_over_distance", "r_j / d", 0.0, 1.05, low_open=True)
 RATIO = Marker("radius_ratio", "r_j / r_i", 0.0, np.inf, low_open=True)
 COUNT = Marker(
-    "n_between", "spheres that reach into the hull of i and j", 0.0, np.inf,
+    "n_between", "spheres in the hull of i and j, by the share of its section", 0.0, np.inf,
     free=0.0, typical=(0.0, 60.0),
 )  # fmt: skip
 FRACTION = Marker(
@@ -67,6 +69,28 @@ PER_LINE = Marker(
     "blockers_per_line", "blockers a line of the pencil meets", 0.0, np.inf,
     free=0.0, typical=(0.0, 10.0),
 )  # fmt: skip
+SHARE = Marker(
+    "wall_share", "solid angle of the wall over 4 pi", 0.0, 1.0, low_open=True, typical=(1e-4, 0.5)
+)
+WALL_DISTANCE = Marker(
+    "distance_over_radius", "distance from the wall over the radius", 1.0, np.inf,
+    typical=(1.0, 20.0),
+)  # fmt: skip
+WALL_BLOCKED = Marker(
+    "blocked_fraction", "blocked share of the lines to the wall", 0.0, 1.0,
+    free=0.0, typical=(0.0, 1.0),
+)  # fmt: skip
+VISIBLE = Marker(
+    "visible_share", "F_ij over the factor of the free pair", 0.0, 1.0, typical=(0.0, 1.0)
+)
+EMISSIVITY = Marker(
+    "emissivity", "emissivity of both spheres", 0.0, 1.0, low_open=True, typical=(0.05, 1.0)
+)
+
+
+def _pair_exact(m: Markers) -> Array:
+    """Exact factor of a free pair [-]."""
+    return pair_factor(m["radius_over_distance"], m["radius_ratio"])
 
 
 def _pair(m: Markers) -> tuple[Array, Array]:
@@ -105,9 +129,53 @@ def _pencil_baseline(m: Markers) -> Array:
     return 0.01 + 0.98 * (1.0 - 1.0 / (1.0 + free * (1.0 + free * (1.0 + free))))
 
 
+def _wall_features(m: Markers) -> Array:
+    features = [
+        m["blocked_fraction"],
+        # Spheres deep in the bed differ in what little they see.
+        np.log(1e-3 + (1.0 - m["blocked_fraction"])),
+        1.0 / m["distance_over_radius"],
+        m["wall_share"],
+        m["solid_fraction"],
+    ]
+    return np.stack(features, axis=-1)
+
+
+def _wall_exact(m: Markers) -> Array:
+    return m["wall_share"]
+
+
+def _reflected_bound(m: Markers) -> Array:
+    """Bound of what j absorbs after reflections: symmetric after multiplication with r_i^2."""
+    ratio2 = m["radius_ratio"] ** 2
+    return (1.0 - m["emissivity"]) * ratio2 / (1.0 + ratio2)
+
+
+def _exchange_exact(m: Markers) -> Array:
+    return m["emissivity"] * m["visible_share"] * _pair_exact(m) + _reflected_bound(m)
+
+
+def _exchange_gate(m: Markers) -> Array:
+    return _reflected_bound(m) / _exchange_exact(m)
+
+
+def _exchange_baseline(m: Markers) -> Array:
+    near, _ = _pair(m)
+    return 0.002 + 0.1 * near * near
+
+
+def _exchange_features(m: Markers) -> Array:
+    near, alike = _pair(m)
+    features = [near, np.log(near), alike, m["visible_share"], m["emissivity"], m["solid_fraction"]]
+    return np.stack(features, axis=-1)
+
+
 @dataclass(frozen=True)
 class MarkerSet:
-    """Inputs of a closure and what visibility makes of them."""
+    """Inputs of a closure and what visibility makes of them.
+
+    ``exact`` is the factor with nothing in between, ``quantity`` what the closure gives.
+    """
 
     name: str
     markers: tuple[Marker, ...]
@@ -115,6 +183,8 @@ class MarkerSet:
     features: Callable[[Markers], Array]
     gate: Callable[[Markers], Array]
     baseline: Callable[[Markers], Array]
+    exact: Callable[[Markers], Array] = _pair_exact
+    quantity: str = "viewfactor"
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -141,6 +211,41 @@ MARKER_SETS = {
         _pencil_features,
         _pencil_gate,
         _pencil_baseline,
+    ),
+    "wall": MarkerSet(
+        "wall",
+        (SHARE, WALL_DISTANCE, WALL_BLOCKED, FRACTION),
+        (
+            "blocked_fraction",
+            "log(0.001 + free)",
+            "radius / distance",
+            "wall_share",
+            "solid_fraction",
+        ),
+        _wall_features,
+        _pencil_gate,
+        _pencil_baseline,
+        _wall_exact,
+        "wallfactor",
+    ),
+    # D_ij = e F_ij + (1 - e) K_ij: what j absorbs at the first hit, and after reflections. K, the
+    # mean of D over the places of the first reflection, is learnt between 0 and its bound.
+    "exchange": MarkerSet(
+        "exchange",
+        (OVER_DISTANCE, RATIO, VISIBLE, EMISSIVITY, FRACTION),
+        (
+            _SHARED[0],
+            "log((r_i + r_j) / d)",
+            _SHARED[1],
+            "visible_share",
+            "emissivity",
+            "solid_fraction",
+        ),
+        _exchange_features,
+        _exchange_gate,
+        _exchange_baseline,
+        _exchange_exact,
+        "exchange",
     ),
 }
 
