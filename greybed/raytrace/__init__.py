@@ -15,6 +15,7 @@ from greybed.raytrace.macroscopic import (
     radiative_exchange_factor,
 )
 from greybed.raytrace.pairs import PairFactors, pair_factors
+from greybed.raytrace.patches import PatchFactors, patch_factors
 from greybed.raytrace.smoothing import smoothed
 from greybed.raytrace.viewfactors import ViewFactors, view_factors
 
@@ -23,6 +24,7 @@ __all__ = [
     "ExchangeRows",
     "ImagePairs",
     "PairFactors",
+    "PatchFactors",
     "RadiativeExchangeFactor",
     "RayShares",
     "ViewFactors",
@@ -31,6 +33,7 @@ __all__ = [
     "exchange_of_rays",
     "first_hits",
     "pair_factors",
+    "patch_factors",
     "radiative_exchange_factor",
     "smoothed",
     "standard_error",

@@ -184,3 +184,28 @@ def first_hits(origins, directions, grid, walls, distance, owner):
         if item >= 0:
             distance[k] = t + enter
             owner[k] = owners[item]
+
+
+@njit(**_OPTIONS)
+def inside_spheres(origins, grid, mask):
+    """Which points (m, 3) of an open packing lie inside a sphere."""
+    frame, start, items = grid.frame, grid.start, grid.items
+    low, edge = frame.low, frame.edge
+    for k in range(origins.shape[0]):
+        x, y, z = origins[k, 0], origins[k, 1], origins[k, 2]
+        within = low[0] <= x <= low[0] + edge[0]
+        within = within and low[1] <= y <= low[1] + edge[1]
+        within = within and low[2] <= z <= low[2] + edge[2]
+        mask[k] = False
+        if not within:
+            continue
+        ix = _cell_of(x, low[0], frame.inverse[0], frame.nx)
+        iy = _cell_of(y, low[1], frame.inverse[1], frame.ny)
+        iz = _cell_of(z, low[2], frame.inverse[2], frame.nz)
+        c = (ix * frame.ny + iy) * frame.nz + iz
+        for m in range(np.int64(start[c]), np.int64(start[c + 1])):
+            e = 4 * np.int64(items.entry[m])
+            qx, qy, qz = items.table[e] - x, items.table[e + 1] - y, items.table[e + 2] - z
+            if qx * qx + qy * qy + qz * qz < items.table[e + 3]:
+                mask[k] = True
+                break

@@ -130,3 +130,11 @@ def sphere_rays(points, n, seeds, rays, at):
         r3[k] = x * (1.0 + sign * dx * dx * a) + y * b + lift * dx
         r4[k] = x * (sign * b) + y * (sign + dy * dy * a) + lift * dy
         r5[k] = x * (-sign * dx) - y * dy + lift * dz
+
+
+@njit(**_OPTIONS)
+def cube(points, n, seeds, numbers):
+    """First ``n`` points of a sequence, scrambled, into ``numbers`` (n, 4)."""
+    for k in range(n):
+        for d in range(4):
+            numbers[k, d] = scrambled(points[d, k], seeds[d])
