@@ -9,7 +9,8 @@ import numpy as np
 from numba import njit
 
 from greybed.core.errors import InputError
-from greybed.core.walls import Cylinder, Plane, Wall
+from greybed.core.walls import Cone, Cylinder, Disc, Mesh, Plane, Polygon, Wall
+from greybed.raytrace._emission import emitters
 from greybed.raytrace._kernels import (
     ESCAPED,
     IMAGE_LIMIT,
@@ -19,7 +20,7 @@ from greybed.raytrace._kernels import (
     march,
 )
 from greybed.raytrace._streams import GOLDEN, MIX_1, emit, in_disc, mix
-from greybed.raytrace._walls import wall_hit
+from greybed.raytrace._walls import crosses, patch_normal, wall_hit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
@@ -34,7 +35,7 @@ LEAST_EMISSIVITY = 1e-3
 # Answers of :func:`follow` other than a number of keys.
 BURIED, FULL = -1, -2
 
-_PLANE, _CYLINDER = 0.0, 1.0
+_PLANE, _CYLINDER, _PATCH = 0.0, 1.0, 2.0
 _S11 = np.uint64(11)
 _UNIT = 2.0**-53
 
@@ -49,15 +50,17 @@ def normal_tables(walls: Sequence[Wall], reflecting: np.ndarray) -> np.ndarray:
     """
     rows = np.full((len(walls), 7), np.nan)
     for k, wall in enumerate(walls):
-        # Another kind of wall: a number, a branch here and one in _wall_normal.
         if isinstance(wall, Plane):
             rows[k] = _PLANE, *wall.point, *wall.normal
-        elif isinstance(wall, Cylinder):
+        elif isinstance(wall, Cylinder) and wall.length is None:
             rows[k] = _CYLINDER, *wall.point, *wall.axis
+        elif isinstance(wall, Cylinder | Cone | Disc | Polygon | Mesh):
+            # Met from both sides: the normal follows from the hit, the lift from the size.
+            rows[k, :2] = _PATCH, emitters([wall]).lift[0]
         elif reflecting[k]:
             raise InputError(
                 f"wall {k} is a {type(wall).__name__}, from which no light is reflected yet; "
-                "give it emissivity 1 or use planes and cylinders."
+                "give it emissivity 1 or use another kind."
             )
     return rows
 
@@ -183,7 +186,13 @@ def follow(
                 ox, sx = _into(centres[emitter, 0] + radius * ox, low[0], edge[0], periodic[0])
                 oy, sy = _into(centres[emitter, 1] + radius * oy, low[1], edge[1], periodic[1])
                 oz, sz = _into(centres[emitter, 2] + radius * oz, low[2], edge[2], periodic[2])
-                if exposed[emitter] or not buried(ox, oy, oz, frame, start, items, walls):
+                if exposed[emitter] or not (
+                    buried(ox, oy, oz, frame, start, items, walls)
+                    or crosses(
+                        centres[emitter, 0], centres[emitter, 1], centres[emitter, 2],
+                        ox, oy, oz, walls,
+                    )
+                ):  # fmt: skip
                     break
                 attempt += 1
                 if attempt == MAX_ATTEMPTS:
@@ -292,8 +301,15 @@ def follow(
                 oz, tz = _into(cz + radius * nz, low[2], edge[2], periodic[2])
                 outside = False
             else:
-                ox, oy, oz = ox + at_wall * dx, oy + at_wall * dy, oz + at_wall * dz
-                nx, ny, nz = _wall_normal(ox, oy, oz, normals[wall])
+                if normals[wall, 0] == _PATCH:
+                    nx, ny, nz = patch_normal(ox, oy, oz, dx, dy, dz, at_wall, wall, walls.patches)
+                    lift = normals[wall, 1]
+                    ox += at_wall * dx + lift * nx
+                    oy += at_wall * dy + lift * ny
+                    oz += at_wall * dz + lift * nz
+                else:
+                    ox, oy, oz = ox + at_wall * dx, oy + at_wall * dy, oz + at_wall * dz
+                    nx, ny, nz = _wall_normal(ox, oy, oz, normals[wall])
                 ox, tx = _into(ox, low[0], edge[0], periodic[0])
                 oy, ty = _into(oy, low[1], edge[1], periodic[1])
                 oz, tz = _into(oz, low[2], edge[2], periodic[2])

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from greybed.core import patches as bounded
-from greybed.core._kernels import patch_hit
+from greybed.core._kernels import patch_hit, triangle_hit
 from greybed.core.walls import Cylinder, Plane, Wall
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
@@ -154,3 +154,42 @@ def crosses(cx, cy, cz, x, y, z, walls):
     length = math.sqrt(dx * dx + dy * dy + dz * dz)
     _, number = patch_hit(cx, cy, cz, dx / length, dy / length, dz / length, length, walls.patches)
     return number >= 0
+
+
+@njit(**_OPTIONS)
+def patch_normal(ox, oy, oz, dx, dy, dz, t, wall, patches):
+    """Normal of a bounded wall where a ray meets it after ``t`` [m], on the ray's side."""
+    nx, ny, nz = 0.0, 0.0, 0.0
+    known = False
+    for k in range(patches.disc_number.size):
+        if patches.disc_number[k] == wall:
+            nx, ny, nz = patches.discs[k, 3], patches.discs[k, 4], patches.discs[k, 5]
+            known = True
+    for k in range(patches.cone_number.size):
+        if patches.cone_number[k] == wall:
+            c = patches.cones[k]
+            qx, qy, qz = ox + t * dx - c[0], oy + t * dy - c[1], oz + t * dz - c[2]
+            along = qx * c[3] + qy * c[4] + qz * c[5]
+            qx, qy, qz = qx - along * c[3], qy - along * c[4], qz - along * c[5]
+            rho = math.sqrt(qx * qx + qy * qy + qz * qz)
+            rise = (c[7] - c[6]) / c[8]
+            scale = 1.0 / math.sqrt(1.0 + rise * rise)
+            nx = (rise * c[3] - qx / rho) * scale
+            ny = (rise * c[4] - qy / rho) * scale
+            nz = (rise * c[5] - qz / rho) * scale
+            known = True
+    if not known:
+        # The search once more, which ends at once: the place of the triangle was not kept.
+        _, place = triangle_hit(
+            ox, oy, oz, dx, dy, dz, t * (1.0 + 1e-9) + 1e-300, patches.boxes, patches.links,
+            patches.corners,
+        )  # fmt: skip
+        c = patches.corners[place]
+        ux, uy, uz = c[3] - c[0], c[4] - c[1], c[5] - c[2]
+        vx, vy, vz = c[6] - c[0], c[7] - c[1], c[8] - c[2]
+        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        scale = 1.0 / math.sqrt(nx * nx + ny * ny + nz * nz)
+        nx, ny, nz = nx * scale, ny * scale, nz * scale
+    if nx * dx + ny * dy + nz * dz > 0.0:
+        nx, ny, nz = -nx, -ny, -nz
+    return nx, ny, nz
