@@ -200,10 +200,14 @@ def _learning(points: Sequence[Mapping[str, Any]]) -> tuple[Section, ...]:
 
 
 def curve_figure(packings: Sequence[int], rmse: Sequence[float]) -> Markup:
-    """Error against number of packings, both logarithmic."""
+    """Error against number of packings, both logarithmic where no error is zero."""
     with figures.style():
         figure, axes = figures.new_figure()
-        axes.loglog(packings, rmse, color=figures.SERIES[0], marker="o", lw=1.8)
+        axes.plot(packings, rmse, color=figures.SERIES[0], marker="o", lw=1.8)
+        axes.set_xscale("log")
+        # Noise is subtracted, so an own error below it comes out as zero.
+        if min(rmse) > 0.0:
+            axes.set_yscale("log")
         axes.set_xticks(list(packings), [str(n) for n in packings])
         axes.minorticks_off()
         low, high = min(rmse), max(rmse)

@@ -99,13 +99,16 @@ def test_beds(name, verb, tmp_path, monkeypatch, capsys):
         ("/dev/zero", "not a regular file"),
         ("data.h5", "'greybed-viewfactors' is not 'greybed-packing'"),
         ("factors.h5", "'greybed-view-factors' is not 'greybed-packing'"),
-        ("mlp.closure", "not those of text"),
         ("cut.h5", "cut or damaged"),
     ],
 )
 def test_what_is_no_packing(here, capsys, file, message):
     Path("cut.h5").write_bytes(Path("bed.h5").read_bytes()[:-500])
     refused(["info", file], capsys, message)
+
+
+def test_a_closure_is_no_packing(here, capsys):
+    refused("trace mlp.closure --out out", capsys, "not those of text")
 
 
 def test_no_permission(here, capsys, monkeypatch):
@@ -311,13 +314,12 @@ def test_a_design_and_a_case_exchanged(here, capsys):
     refused("dataset viewfactor case.toml --out out.h5", capsys, "case.toml: kind is not a known")
 
 
-def test_a_data_set_without_a_split_is_told_before_the_fit(here, capsys):
+def test_a_design_without_a_split_is_told_before_the_packings(here, capsys):
     text = Path("design.toml").read_text().replace('"calibrate"', '"train"')
     Path("design.toml").write_text(text)
-    assert main(["dataset", "viewfactor", "design.toml", "--out", "bare.h5"]) == 0
-    capsys.readouterr()
-    message = r"bare\.h5: the data set has 0 rows in the split 'calibrate', at least 100"
-    refused("train viewfactor bare.h5 --out out", capsys, message)
+    message = r"design\.toml: no \[\[packing\]\] table has split = 'calibrate'"
+    refused("dataset viewfactor design.toml --out bare.h5", capsys, message)
+    assert not Path("bare.h5").exists()
 
 
 def test_one_training_packing_gives_finite_closures(here):

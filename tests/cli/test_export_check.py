@@ -15,7 +15,7 @@ import pytest
 import greybed.export.replay as replay_module
 from greybed.cli import main
 from greybed.closures import ViewFactorClosure, artifact, content_hash, save
-from greybed.closures.viewfactor import closure as closure_module
+from greybed.closures.viewfactor import visibility
 from greybed.export import find_compiler
 
 needs_compiler = pytest.mark.skipif(
@@ -99,18 +99,18 @@ def test_check_prints_every_case_for_every_form(model, closure, tmp_path, capsys
 
 def test_a_limit_that_fails_gives_one(model, capsys, monkeypatch):
     # A law that leaks: everything 1e-6 too large, golden rows made with it as well.
-    right = closure_module.pair_factor
-    monkeypatch.setattr(closure_module, "pair_factor", lambda x, ratio: right(x, ratio) * 1.000001)
+    right = visibility.pair_factor
+    monkeypatch.setattr(visibility, "pair_factor", lambda x, ratio: right(x, ratio) * 1.000001)
     monkeypatch.setattr(artifact, "GOLDEN_TOLERANCE", 1e-5)
     assert main(["check", model]) == 1
     text = capsys.readouterr().out
-    assert re.search(r"nothing between: F = F_exact +1\.00e-06 +1\.00e-14  FAIL", text)
+    assert re.search(r"in free contact: 0\.0755868184216 +1\.00e-06 +1\.00e-14  FAIL", text)
     assert text.rstrip().endswith("a check FAILED")
 
 
 def test_a_golden_row_that_fails_gives_one(model, capsys, monkeypatch):
-    right = closure_module.pair_factor
-    monkeypatch.setattr(closure_module, "pair_factor", lambda x, ratio: right(x, ratio) * 1.000001)
+    right = visibility.pair_factor
+    monkeypatch.setattr(visibility, "pair_factor", lambda x, ratio: right(x, ratio) * 1.000001)
     assert main(["check", model]) == 1
     assert "golden row" in capsys.readouterr().err
 

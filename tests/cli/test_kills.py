@@ -21,7 +21,10 @@ from greybed.report.stages import Stages
 
 DESIGN = "rays = 6000\nemitters = 40\nseed = 4\n" + "".join(
     f'[[packing]]\nkind = "random"\ncount = 300\nshake = 20\nfraction = {fraction}\n'
-    for fraction in (0.2, 0.25, 0.3, 0.35, 0.4, 0.45)
+    f'split = "{split}"\n'
+    for fraction, split in zip(
+        (0.2, 0.25, 0.3, 0.35, 0.4, 0.45), 2 * ("train", "calibrate", "test"), strict=True
+    )
 )
 DATASET = ("dataset", "viewfactor", "long.toml", "--out", "out/data.h5")
 
@@ -114,13 +117,13 @@ def test_a_part_that_was_cut_is_made_again(long_design, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copy(long_design / "long.toml", tmp_path)
     text = DESIGN.replace("6000", "200").split("[[packing]]")
-    Path("short.toml").write_text("[[packing]]".join(text[:3]))
+    Path("short.toml").write_text("[[packing]]".join(text[:4]))
     words = ["dataset", "viewfactor", "short.toml", "--out", "out/data.h5"]
     monkeypatch.setattr(shutil, "rmtree", lambda *args, **options: None)
     assert main(words) == 0
     before = sha("out/data.h5")
     cut = parts(tmp_path)
-    assert len(cut) == 2
+    assert len(cut) == 3
     cut[0].write_bytes(cut[0].read_bytes()[:999])
     assert main(words) == 0
     assert sha("out/data.h5") == before
@@ -316,11 +319,7 @@ CHAIN = (
 def test_threads_change_no_bit(tmp_path):
     """The whole chain in fresh processes, on one processor and on all, with one thread and two."""
     split = DESIGN.replace("6000", "1000").split("[[packing]]")
-    names = ["", "", "train", "calibrate", "test"]
-    design = "[[packing]]".join(
-        part + (f'split = "{name}"\n' if name else "")
-        for part, name in zip(split[:5], names, strict=True)
-    )
+    design = "[[packing]]".join(split[:5])
     code = "from greybed.cli import main\n" + "\n".join(
         f"assert main({words.split()}) == 0" for words in CHAIN
     )

@@ -34,7 +34,7 @@ RUNS = {
     ),
     "train": (
         "train viewfactor data.h5 --epochs 1 --seed 3 --out out",
-        "out", ["data.h5"], ["viewfactor_mlp_pencil.closure"],
+        "out", ["data.h5"], ["viewfactor_mlp_pencil.closure", "viewfactor_mlp_pencil.html"],
     ),
     "check": ("check forest.closure --exported onnx --out out", "out", ["forest.closure"], []),
     "export": (
