@@ -22,10 +22,11 @@ from pathlib import Path
 import numpy as np
 import onnxruntime
 
-from greybed.closures.viewfactor import ViewFactorClosure
+from greybed.closures import load, model_path
 from greybed.export import export_cpp, export_onnx
 
 SOURCE = Path(__file__).parent / "peers" / "closure_rate.cpp"
+MODELS = ("shipped:viewfactor_mlp_pencil", "shipped:viewfactor_mlp_published")
 BATCHES = (1, 64, 1024, 16_384)
 BAR = 0.5e-6
 AGREE = 1e-10
@@ -40,6 +41,8 @@ def rows(n: int) -> dict[str, np.ndarray]:
         "radius_ratio": ratio,
         "blocked_fraction": rng.uniform(0.0, 1.0, n),
         "blockers_per_line": rng.uniform(0.0, 5.0, n),
+        "n_between": rng.uniform(0.0, 8.0, n),
+        "solid_fraction": rng.uniform(0.1, 0.63, n),
     }
 
 
@@ -79,25 +82,28 @@ def main() -> int:
     )
     parser.add_argument("--pairs", type=int, default=5, help="runs of each, in turn (default 5)")
     parser.add_argument("--rows", type=int, default=65_536)
+    parser.add_argument(
+        "--model", action="append", help="a .closure of pairs (the shipped networks by default)"
+    )
     options = parser.parse_args()
     if shutil.which("g++") is None:
         print("needs g++")
         return 2
-    columns = rows(options.rows)
+    table = rows(options.rows)
     slowest, ratios, same = 0.0, [], True
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         data = folder / "rows.bin"
-        data.write_bytes(
-            np.int32(options.rows).tobytes()
-            + b"".join(values.astype("<f8").tobytes() for values in columns.values())
-        )
-        for kind in ("mlp", "forest"):
-            # The time does not depend on what was learnt; these are the sizes that train makes.
-            closure = ViewFactorClosure.untrained(kind, "pencil")
-            header = export_cpp(closure, folder / kind)
-            graph = export_onnx(closure, folder / f"{kind}.onnx")
-            binary = folder / f"rate_{kind}"
+        for number, model in enumerate(options.model or MODELS):
+            closure = load(model_path(model))
+            columns = {marker: table[marker] for marker in closure.marker_names}
+            data.write_bytes(
+                np.int32(options.rows).tobytes()
+                + b"".join(values.astype("<f8").tobytes() for values in columns.values())
+            )
+            header = export_cpp(closure, folder / str(number))
+            graph = export_onnx(closure, folder / f"{number}.onnx")
+            binary = folder / f"rate_{number}"
             build = ["g++", "-std=c++11", "-O3", "-march=native", f"-I{header.parent}"]
             build += [f'-DCLOSURE_HEADER="{header.name}"', f"-DCLOSURE=greybed::{header.stem}"]
             subprocess.run([*build, SOURCE, "-o", binary], check=True)
@@ -115,7 +121,7 @@ def main() -> int:
             ratios.append(ratio)
             slowest = max(slowest, statistics.median(ours))
             print(
-                f"{kind}: C++ {1e6 * found['single']:.3f} us a call, "
+                f"{model}: C++ {1e6 * found['single']:.3f} us a call, "
                 f"{1e6 * statistics.median(ours):.3f} us a pair in a batch; ONNX Runtime "
                 f"{onnxruntime.__version__} {1e6 * statistics.median(theirs):.3f} us a pair in "
                 f"batches of {batch}; ratio {ratio:.2f}"
