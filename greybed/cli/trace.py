@@ -21,13 +21,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from greybed.cli.info import add_input_arguments
+from greybed.cli.walls import parse_walls
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
     from greybed.core.packing import Packing
-    from greybed.core.walls import Wall
     from greybed.raytrace import ViewFactors
 
 FILE = "view_factors.h5"
@@ -69,88 +69,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="L",
         help="rays that meet nothing within it escape, such as 20mm (default: no limit)",
     )
+    parser.add_argument(
+        "--rel-error",
+        type=float,
+        metavar="E",
+        help="trace until every factor of at least --least has this relative standard error, such "
+        "as 0.01; in one go, not resumed",
+    )
+    parser.add_argument(
+        "--least", type=float, default=1e-2, metavar="F", help="see --rel-error (default: 0.01)"
+    )
+    parser.add_argument(
+        "--smooth",
+        action="store_true",
+        help="make factors reciprocal and rows add up to one, with the errors that remain",
+    )
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
-
-
-def _number(text: str, where: str, *, length: bool) -> float:
-    """One number: a length in metres or with its unit, or a plain number."""
-    from greybed.core.errors import InputError
-    from greybed.core.units import parse_quantity
-
-    try:
-        return float(text)
-    except ValueError:
-        if length:
-            return parse_quantity(text, "length", where)
-        raise InputError(f"{where}: {text!r} is not a number; give one without unit.") from None
-
-
-# kind -> how it is typed, an example, numbers in each part
-WALLS = {
-    "plane": ("plane:X,Y,Z:NX,NY,NZ", "plane:0,0,0:0,0,1", ([3, 3],)),
-    "cylinder": (
-        "cylinder:X,Y,Z:AX,AY,AZ:R[:LENGTH]",
-        "cylinder:0,0,0:0,0,1:30mm",
-        ([3, 3, 1], [3, 3, 1, 1]),
-    ),
-    "cone": (
-        "cone:X,Y,Z:AX,AY,AZ:R:END_R:LENGTH",
-        "cone:0,0,0:0,0,1:10mm:30mm:50mm",
-        ([3, 3, 1, 1, 1],),
-    ),
-    "disc": ("disc:X,Y,Z:NX,NY,NZ:R", "disc:0,0,0:0,0,1:30mm", ([3, 3, 1],)),
-    "box": ("box:X,Y,Z:X,Y,Z", "box:0,0,0:1cm,1cm,2cm", ([3, 3],)),
-    "polygon": ("polygon:X,Y,Z:X,Y,Z:X,Y,Z...", "polygon:0,0,0:1cm,0,0:0,1cm,0", ()),
-}
-
-
-def parse_walls(text: str, name: str) -> tuple[Wall, ...]:
-    """Read what ``--wall`` takes; a box is six walls, a mesh file one for each of its groups.
-
-    Raises
-    ------
-    InputError
-        If the kind is unknown, a number is missing or wrong, or a file cannot be used.
-    """
-    from greybed.core.errors import InputError
-    from greybed.core.readers import read_mesh
-    from greybed.core.walls import Cone, Cylinder, Disc, Plane, Polygon, box_walls
-
-    where = f"--wall {text}"
-    kind, _, rest = text.partition(":")
-    if kind == "mesh":
-        # A colon may also stand in the name of the file.
-        named = Path(rest).suffix.lower() in (".stl", ".obj", ".ply")
-        file, _, unit = (rest, "", "m") if named else rest.rpartition(":")
-        if not file:
-            raise InputError(f"{where}: give mesh:FILE[:UNIT], such as mesh:oven.stl:mm.")
-        return read_mesh(file, unit, name)
-    if kind not in WALLS:
-        raise InputError(
-            f"{where}: give {', '.join(said for said, _, _ in WALLS.values())} or mesh:FILE[:UNIT]."
-        )
-    parts = [part.split(",") for part in rest.split(":")]
-    counts = [len(part) for part in parts]
-    said, example, layouts = WALLS[kind]
-    if counts not in layouts and not (kind == "polygon" and counts == [3] * max(len(counts), 3)):
-        raise InputError(f"{where}: give {said}, such as {example}.")
-    numbers = [
-        [_number(word, where, length=kind in ("box", "polygon") or k != 1) for word in part]
-        for k, part in enumerate(parts)
-    ]
-    if kind == "polygon":
-        return (Polygon(tuple((x, y, z) for x, y, z in numbers), name),)
-    (x, y, z), (u, v, w) = numbers[:2]
-    sizes = [part[0] for part in numbers[2:]]
-    if kind == "box":
-        return box_walls((x, y, z), (u, v, w), name)
-    if kind == "plane":
-        return (Plane((x, y, z), (u, v, w), name),)
-    if kind == "disc":
-        return (Disc((x, y, z), (u, v, w), sizes[0], name),)
-    if kind == "cone":
-        return (Cone((x, y, z), (u, v, w), sizes[0], sizes[1], sizes[2], name),)
-    return (Cylinder((x, y, z), (u, v, w), sizes[0], name, *sizes[1:]),)
 
 
 class State:
@@ -330,6 +264,7 @@ def run(options: argparse.Namespace) -> int:
     from greybed.core.readers import read_packing
     from greybed.core.units import parse_quantity
     from greybed.datasets.factors_file import write_factors
+    from greybed.raytrace import smoothed, view_factors
     from greybed.raytrace.tally import available_threads
 
     names = [f"{text.partition(':')[0]}_{k + 1}" for k, text in enumerate(options.wall)]
@@ -344,30 +279,51 @@ def run(options: argparse.Namespace) -> int:
     packing = read_packing(options.file, walls, frame=options.frame, unit=options.length_unit)
     folder = output_folder(options.out)
     with sole_writer(folder / f"{STATE}.lock"):
-        result, state, found = trace_resumably(
-            packing,
-            folder,
-            rays=options.rays,
-            seed=options.seed,
-            threads=options.threads,
-            max_distance=limit,
-            show=not options.quiet,
-        )
+        state, found = None, 0
+        if options.rel_error is not None:
+            result = view_factors(
+                packing,
+                rays=options.rays,
+                rel_error=options.rel_error,
+                least=options.least,
+                seed=options.seed,
+                threads=options.threads,
+                max_distance=limit,
+                show_progress=not options.quiet,
+            )
+        else:
+            result, state, found = trace_resumably(
+                packing,
+                folder,
+                rays=options.rays,
+                seed=options.seed,
+                threads=options.threads,
+                max_distance=limit,
+                show=not options.quiet,
+            )
+        cost = int(result.cost.sum())
+        if options.smooth:
+            result = smoothed(result)
         results = {
             **summarise(packing, result),
             "max_distance_m": limit if math.isfinite(limit) else None,
             "threads": options.threads or available_threads(),
             "seconds_tracing": result.seconds,
-            "mrays_per_second": 1e-6 * result.rays * len(packing) / max(result.seconds, 1e-9),
+            "mrays_per_second": 1e-6 * cost / max(result.seconds, 1e-9),
+            "rays_and_lines": cost,
+            "rel_error": options.rel_error,
+            "least_factor": options.least if options.rel_error is not None else None,
+            "smooth": options.smooth,
             "spheres_found_from_stopped_run": found,
         }
         path = write_factors(folder / FILE, packing, result, max_distance=limit)
         summary = write_summary(folder, "trace", results, options.file, seed=options.seed)
-        state.remove()
+        if state is not None:
+            state.remove()
     if found:
         print(f"went on from a stopped run: {found} of {len(packing)} spheres were done")
     print(
-        f"{len(packing)} spheres, {result.rays} rays each, {result.seconds:.1f} s, "
+        f"{len(packing)} spheres, {cost / len(packing):.0f} rays each, {result.seconds:.1f} s, "
         f"{results['mrays_per_second']:.2f} Mray/s on {results['threads']} threads"
     )
     shares = {"spheres": results["mean_row_sum_to_spheres"], **results["mean_to_walls"]}

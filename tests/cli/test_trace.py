@@ -266,3 +266,21 @@ def test_a_duplicate_is_named(tmp_path, capsys):
     words = ["trace", str(tmp_path / "bed.h5"), "--rays", "10", "--out", str(tmp_path / "out")]
     assert main(words) == 2
     assert "bed.h5: sphere 1 lies wholly inside" in capsys.readouterr().err
+
+
+def test_accuracy_on_request_and_smooth_rows(tmp_path):
+    bed = tmp_path / "bed.h5"
+    words = ["pack", "--count", "60", "--fraction", "0.4", "--sizes", "mono:1mm", "--out"]
+    assert main([*words, str(bed)]) == 0
+    out = tmp_path / "out"
+    words = ["trace", str(bed), "--rays", "500", "--rel-error", "0.05", "--least", "0.02"]
+    assert main([*words, "--smooth", "--quiet", "--out", str(out)]) == 0
+    result = read_factors(out / "view_factors.h5").result
+    # Smoothing moves factors by their errors, also across the least one.
+    large = result.factors.data >= 0.024
+    assert (result.stderr.data[large] <= 0.05 * result.factors.data[large]).all()
+    sums = result.factors.sum(axis=1) + result.escaped
+    assert abs(sums - 1.0).max() <= 1e-12
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["rays_and_lines"] == int(result.cost.sum())
+    assert main(["trace", str(bed), "--rel-error", "0", "--out", str(out)]) == 2
