@@ -32,8 +32,7 @@ if TYPE_CHECKING:
 
 FILE = "view_factors.h5"
 STATE = ".trace"
-# Work between two saves: some tenths of a second. Each chunk builds the cell grid again, so it
-# must also be long against that, which takes as long as some tens of rays per sphere.
+# Work between two saves: some tenths of a second, and long against what a chunk's arrays cost.
 RAYS_PER_CHUNK = 4_000_000
 RAYS_PER_CHUNK_AND_SPHERE = 400
 
@@ -198,13 +197,14 @@ def trace_resumably(
     from greybed.core.progress import progress
     from greybed.datasets.factors_file import packing_hash
     from greybed.raytrace import view_factors
+    from greybed.raytrace.scene import Scene
 
     n = len(packing)
     work = max(RAYS_PER_CHUNK, RAYS_PER_CHUNK_AND_SPHERE * n)
     size = min(max(work // max(rays, 1), 1), n)
     settings = [__version__, packing_hash(packing), rays, seed, max_distance, size]
     state = State(folder, hashlib.sha256(json.dumps(settings).encode()).hexdigest()[:32])
-    parts, found = [], 0
+    parts, found, scene = [], 0, None
     with progress(n * max(rays, 0), "tracing rays", show=show) as advance:
         for first in range(0, n, size):
             last = min(first + size, n)
@@ -212,6 +212,7 @@ def trace_resumably(
             if part is not None:
                 found += last - first
             else:
+                scene = scene or Scene.of(packing)
                 result = view_factors(
                     packing,
                     rays=rays,
@@ -219,6 +220,7 @@ def trace_resumably(
                     threads=threads,
                     emitters=np.arange(first, last),
                     max_distance=max_distance,
+                    scene=scene,
                 )
                 part = _rows(result, first, last)
                 state.save(first, last, part)

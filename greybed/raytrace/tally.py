@@ -92,6 +92,7 @@ def trace(
     images: bool = False,
     max_distance: float = np.inf,
     sampling: str = "sobol",
+    scene: Scene | None = None,
     show_progress: bool = False,
 ) -> Tally:
     """Trace ``rays`` cosine-law rays from each emitter to the first sphere or wall.
@@ -115,6 +116,8 @@ def trace(
     sampling : str
         ``sobol``: scrambled quasi-random rays in 16 independent replicates, or more where one
         would exceed 16,384 rays; ``random``: every ray on its own.
+    scene : Scene, optional
+        That of the packing, where it is built already.
 
     Raises
     ------
@@ -135,7 +138,9 @@ def trace(
     if who[0] < 0 or who[-1] >= n:
         raise InputError(f"emitters must lie in 0 ... {n - 1}; got {who[0]} ... {who[-1]}.")
     begin = time.perf_counter()
-    job = _Job.of(Scene.of(packing), rays, seed, sampling, images, max_distance)
+    if scene is not None and scene.packing is not packing:
+        raise InputError(f"{packing.source}: the scene is that of another packing; leave it out.")
+    job = _Job.of(scene or Scene.of(packing), rays, seed, sampling, images, max_distance)
     blocks = list(job.blocks(who))
     emitter, key, count, square = [], [], [], []
     rejected = np.zeros(n)

@@ -11,6 +11,7 @@ from scipy import sparse
 from greybed.core import InputError, Packing
 from greybed.raytrace import _kernels, tally
 from greybed.raytrace.errors import sequence_error, standard_error
+from greybed.raytrace.scene import Scene
 from greybed.raytrace.smoothing import smoothed
 
 Array = NDArray[np.float64]
@@ -75,6 +76,7 @@ def view_factors(
     max_distance: float = np.inf,
     sampling: str = "sobol",
     smooth: bool = False,
+    scene: Scene | None = None,
     show_progress: bool = False,
 ) -> ViewFactors:
     """Trace the view factors of a packing.
@@ -108,6 +110,8 @@ def view_factors(
     smooth : bool
         Make the factors reciprocal and the rows add up to one, see
         :func:`greybed.raytrace.smoothed`.
+    scene : Scene, optional
+        That of the packing, where it is built already: for calls with a few emitters each.
     show_progress : bool
         Draw a progress bar on standard error.
 
@@ -151,6 +155,7 @@ def view_factors(
         emitters=emitters,
         max_distance=max_distance,
         sampling=sampling,
+        scene=scene,
         show_progress=show_progress,
     )
     if sampling == "sobol":

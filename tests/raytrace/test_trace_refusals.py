@@ -75,3 +75,15 @@ def test_wholly_buried_spheres_are_named():
 def test_free_rays(origins, directions, message):
     with pytest.raises(InputError, match=message):
         first_hits(PAIR, origins, directions)
+
+
+def test_a_scene_of_another_packing():
+    from greybed.raytrace.scene import Scene
+
+    one, other = (Packing([[0, 0, 0], [d, 0, 0]], 1.0) for d in (2.0, 3.0))
+    with pytest.raises(InputError, match="another packing"):
+        view_factors(one, rays=10, scene=Scene.of(other))
+    np.testing.assert_array_equal(
+        view_factors(one, rays=100, scene=Scene.of(one)).factors.toarray(),
+        view_factors(one, rays=100).factors.toarray(),
+    )
