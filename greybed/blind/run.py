@@ -6,8 +6,6 @@ import json
 import shutil
 import tempfile
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +13,7 @@ from greybed.blind.generate import make, plan
 from greybed.blind.sealed import seal, unseal, write_set
 from greybed.core.errors import GreybedError
 from greybed.core.files import write_json
+from greybed.core.processes import processes
 from greybed.core.progress import progress
 
 Answer = dict[str, Any]
@@ -103,7 +102,7 @@ def blind_test(
                 write_json(_result(folder, i), _answer(job))
                 advance(1)
         else:
-            with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+            with processes(jobs) as pool:
                 for i, answer in zip(todo, pool.map(_answer, work), strict=True):
                     write_json(_result(folder, i), answer)
                     advance(1)

@@ -88,7 +88,8 @@ class Rows:
         ----------
         result : object
             Anything with ``factors``, ``wall_factors``, ``escaped`` and, optionally, ``areas``;
-            with ``emission_areas`` and ``emissivity``, too, for exchange factors.
+            with ``emission_areas`` and ``emissivity``, too, for exchange factors. A share
+            ``environment`` beyond a distance limit goes to the spheres, see :func:`localised`.
         packing : Packing
             The bed that they belong to.
 
@@ -137,7 +138,11 @@ class Rows:
         own = areas if own is None else own
         if own is None:
             raise InputError("the factors come without areas; give Rows with areas [m2].")
-        return cls(result.factors, result.wall_factors, result.escaped, own, emissivity)
+        factors = result.factors
+        beyond = getattr(result, "environment", None)
+        if beyond is not None and (beyond > 0.0).any():
+            factors = localised(factors, beyond)
+        return cls(factors, result.wall_factors, result.escaped, own, emissivity)
 
     @cached_property
     def sums(self) -> Array:
@@ -155,6 +160,38 @@ class Rows:
         skew = abs(exchange - exchange.T).tocsr()
         reciprocity = skew.max() / self.areas.min() if skew.nnz else 0.0
         return float(max(abs(self.sums - 1.0).max(), reciprocity))
+
+
+def localised(factors: Any, environment: Array) -> csr_matrix:
+    """Factors with what lies beyond a distance limit given to the surroundings of each sphere.
+
+    Parameters
+    ----------
+    factors : sparse array, shape (n, n)
+        Sphere to sphere [-].
+    environment : array, shape (n,)
+        Share of each row that the limit cut off inside the bed [-].
+
+    Returns
+    -------
+    csr matrix, shape (n, n)
+        Rows scaled such that they hold that share too: what lies beyond has the mean emissive
+        power of what the sphere sees, weighted by the factors. A bed at one temperature stays so.
+
+    Raises
+    ------
+    InputError
+        If a sphere has such a share and sees no other sphere.
+    """
+    seen = np.asarray(factors.sum(axis=1)).ravel()
+    blind = (environment > 0.0) & (seen <= 0.0)
+    if blind.any():
+        raise InputError(
+            f"sphere {int(blind.argmax())} sees no other sphere within max_distance, so its "
+            "surroundings have no local mean; trace with a longer reach."
+        )
+    share = np.divide(environment, seen, out=np.zeros_like(seen), where=environment > 0.0)
+    return csr_matrix(diags(1.0 + share) @ factors)
 
 
 def balanced(rows: Rows, *, tolerance: float = 1e-14, max_iterations: int = 5000) -> Rows:

@@ -1,4 +1,4 @@
-"""View factors in HDF5, version 2: sparse rows with errors, walls, hash of the packing."""
+"""View factors in HDF5, version 3: sparse rows with errors, walls, hash of the packing."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 import os
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,30 @@ from greybed.core.walls import Cylinder, Plane, Wall
 from greybed.raytrace import ViewFactors
 
 FORMAT = "greybed-view-factors"
-VERSION = 2
+VERSION = 3
+# Entries of one HDF5 chunk, half a MiB; and of one write, a whole number of chunks.
+CHUNK = 2**16
+SLAB = 32 * CHUNK
+
+Block = Mapping[str, NDArray[Any]]
+
+
+# Where arrays with an entry for each factor stand, and those with a row for each sphere.
+ENTRY_ARRAYS = {"factors/data": "data", "factors/indices": "indices", "stderr/data": "stderr"}
+ROW_ARRAYS = {
+    "walls/stderr": "wall_stderr",
+    "escaped": "escaped",
+    "escaped_stderr": "escaped_stderr",
+    "environment": "environment",
+    "environment_stderr": "environment_stderr",
+    "cost": "cost",
+    "buried": "buried",
+    "areas": "areas",
+}
+SPHERE_ARRAYS = (
+    "escaped", "escaped_stderr", "environment", "environment_stderr", "buried", "areas",
+)  # fmt: skip
+ROW_NAMES = ("wall_factors", *ROW_ARRAYS.values())
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +64,7 @@ class StoredFactors:
     wall_names : tuple of str
         Names of the walls, in the order of ``result.wall_factors``.
     max_distance : float
-        Rays that met nothing within it escaped [m].
+        Distance at which rays ended [m].
     greybed : str
         Version that wrote the file.
     """
@@ -114,47 +138,127 @@ def write_factors(
     OutputError
         If the file cannot be written.
     """
-    import h5py
-
     n, shape = len(packing), result.wall_factors.shape
     if result.factors.shape != (n, n) or shape != (n, packing.n_walls):
         raise InputError(
             f"{path}: factors of shape {result.factors.shape} and walls {shape} do not belong to "
             f"{n} spheres and {packing.n_walls} walls; give the packing that was traced."
         )
-    row = np.repeat(np.arange(n), np.diff(result.factors.indptr))
-    arrays: dict[str, tuple[NDArray[Any], str]] = {
-        "factors/data": (result.factors.data, "-"),
-        "factors/indices": (result.factors.indices.astype(np.int64), "-"),
-        "factors/indptr": (result.factors.indptr.astype(np.int64), "-"),
-        "stderr/data": (result.stderr.data, "-"),
-        "walls/factors": (result.wall_factors, "-"),
-        "walls/stderr": (result.wall_stderr, "-"),
-        "escaped": (result.escaped, "-"),
-        "escaped_stderr": (result.escaped_stderr, "-"),
-        "cost": (result.cost.astype(np.int64), "-"),
-        "buried": (result.buried, "-"),
-        "areas": (result.areas, "m2"),
-        "sums/spheres": (np.bincount(row, result.factors.data, n), "-"),
-        "sums/walls": (result.wall_factors.sum(axis=1), "-"),
+    return write_blocks(
+        path, packing, [block_of(result, 0, n)], rays=result.rays, seed=result.seed,
+        max_distance=max_distance, reciprocal=result.reciprocal,
+    )  # fmt: skip
+
+
+def block_of(result: ViewFactors, first: int, last: int) -> dict[str, NDArray[Any]]:
+    """Rows ``first`` to ``last - 1`` of a result, in the arrays that :func:`write_blocks` takes."""
+    rows = slice(first, last)
+    entries = slice(*result.factors.indptr[[first, last]])
+    lengths = np.diff(result.factors.indptr)[rows]
+    data = result.factors.data[entries]
+    own = np.repeat(np.arange(last - first), lengths)
+    return {
+        "data": data,
+        "stderr": result.stderr.data[entries],
+        "indices": result.factors.indices[entries].astype(np.int32),
+        "lengths": lengths.astype(np.int64),
+        "sums": np.bincount(own, data, last - first),
+        **{name: getattr(result, name)[rows] for name in ROW_NAMES},
     }
-    names = json.dumps([wall.name for wall in packing.walls])
+
+
+def write_blocks(
+    path: str | os.PathLike[str],
+    packing: Packing,
+    blocks: Sequence[Block],
+    *,
+    rays: int,
+    seed: int,
+    max_distance: float = math.inf,
+    reciprocal: bool = False,
+) -> Path:
+    """Write rows that come in blocks, with one block in memory at a time.
+
+    Parameters
+    ----------
+    path : path
+        File to write, whole or not at all.
+    packing : Packing
+        What was traced.
+    blocks : sequence of mappings
+        Consecutive rows as :func:`block_of` gives them. Each array is looked up when it is
+        written, so a mapping may read it from a file then. The cuts between blocks change no byte.
+    rays, seed, max_distance, reciprocal
+        See :class:`greybed.raytrace.ViewFactors` and :func:`write_factors`.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    import h5py
+
+    def rows(name: str) -> NDArray[Any]:
+        return np.concatenate([block[name] for block in blocks])
+
+    lengths = rows("lengths")
+    start = np.concatenate([[0], np.cumsum(lengths)])
+    walls = rows("wall_factors")
     # Check sums, and texts of fixed length: see core/writers/hdf5.py.
     with atomic_path(path) as part, h5py.File(part, "w", libver=("v110", "v110")) as root:
         root.attrs["format"] = np.bytes_(FORMAT)
         root.attrs["version"] = VERSION
         root.attrs["greybed"] = np.bytes_(__version__)
         root.attrs["packing"] = np.bytes_(packing_hash(packing))
-        root.attrs["rays"] = result.rays
-        root.attrs["seed"] = result.seed
-        root.attrs["reciprocal"] = result.reciprocal
+        root.attrs["rays"] = rays
+        root.attrs["seed"] = seed
+        root.attrs["reciprocal"] = reciprocal
         root.attrs["max_distance"] = max_distance
-        root.attrs["wall_names"] = np.bytes_(names)
-        for name, (values, unit) in arrays.items():
-            checked = {"chunks": True, "fletcher32": True} if values.size else {}
-            dataset = root.create_dataset(name, data=values, **checked)
-            dataset.attrs["units"] = np.bytes_(unit)
+        root.attrs["wall_names"] = np.bytes_(json.dumps([wall.name for wall in packing.walls]))
+        for name, part_of in ENTRY_ARRAYS.items():
+            kind = np.int32 if part_of == "indices" else np.float64
+            target = _created(root, name, (int(start[-1]),), kind)
+            begin = 0
+            for slab in _slabs(block[part_of] for block in blocks):
+                target[begin : begin + len(slab)] = slab
+                begin += len(slab)
+        per_row = {
+            "factors/indptr": start,
+            "walls/factors": walls,
+            "sums/spheres": rows("sums"),
+            "sums/walls": walls.sum(axis=1),
+            **{place: rows(name) for place, name in ROW_ARRAYS.items()},
+        }
+        for name, values in per_row.items():
+            _created(root, name, values.shape, values.dtype)[...] = values
     return Path(path)
+
+
+def _created(root: Any, name: str, shape: tuple[int, ...], kind: Any) -> Any:
+    """An empty dataset with its unit, checked where there is something to check."""
+    size = math.prod(shape)
+    rows = max(1, min(shape[0], CHUNK * shape[0] // max(size, 1)))
+    checked = {"chunks": (rows, *shape[1:]), "fletcher32": True} if size else {}
+    dataset = root.create_dataset(name, shape, kind, **checked)
+    dataset.attrs["units"] = np.bytes_("m2" if name == "areas" else "-")
+    return dataset
+
+
+def _slabs(pieces: Iterator[NDArray[Any]]) -> Iterator[NDArray[Any]]:
+    """The same entries in pieces of SLAB, however they come: HDF5's bytes follow the writes."""
+    held: list[NDArray[Any]] = []
+    count = 0
+    for piece in pieces:
+        held.append(piece)
+        count += len(piece)
+        if count >= SLAB:
+            joined = np.concatenate(held)
+            whole = count - count % SLAB
+            for begin in range(0, whole, SLAB):
+                yield joined[begin : begin + SLAB]
+            held, count = [joined[whole:]], count - whole
+    if count:
+        yield np.concatenate(held)
 
 
 def read_factors(path: str | os.PathLike[str]) -> StoredFactors:
@@ -241,10 +345,7 @@ def _read(place: Path, root: Any) -> StoredFactors:
         stderr=sparse.csr_array((errors, indices, indptr), shape=(n, n)),
         wall_factors=_array(place, root, "walls/factors", (n, len(names)), "f"),
         wall_stderr=_array(place, root, "walls/stderr", (n, len(names)), "f"),
-        escaped=_array(place, root, "escaped", (n,), "f"),
-        escaped_stderr=_array(place, root, "escaped_stderr", (n,), "f"),
-        buried=_array(place, root, "buried", (n,), "f"),
-        areas=_array(place, root, "areas", (n,), "f"),
+        **{name: _array(place, root, name, (n,), "f") for name in SPHERE_ARRAYS},
         rays=int(root.attrs["rays"]),
         seed=int(root.attrs["seed"]),
         seconds=math.nan,

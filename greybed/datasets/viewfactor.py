@@ -7,10 +7,8 @@ import json
 import os
 import shutil
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +22,7 @@ from greybed.closures.viewfactor.bed import inner_fraction
 from greybed.closures.viewfactor.exact import pair_factor
 from greybed.core import InputError, Packing
 from greybed.core.files import atomic_path, output_folder, writable_file
+from greybed.core.processes import finished, processes
 from greybed.core.progress import progress
 from greybed.core.readers.opening import mapped, shown
 from greybed.datasets.beds import (
@@ -261,14 +260,9 @@ def _finished(
     if workers == 1:
         yield ((number, _one(*job)) for number, job in enumerate(jobs))
         return
-    # Spawned, because a fork of a process with threads may hang.
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        numbers = {pool.submit(_one, *job): number for number, job in enumerate(jobs)}
-        try:
-            yield ((numbers[job], job.result()) for job in as_completed(numbers))
-        except BaseException:  # Ctrl-C must not wait for the packings that have not begun
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    order = {id(job): number for number, job in enumerate(jobs)}
+    with processes(workers) as pool:
+        yield ((order[id(job)], columns) for job, columns in finished(pool, _one, jobs, len(jobs)))
 
 
 def _one(

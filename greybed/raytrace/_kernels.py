@@ -9,8 +9,10 @@ from greybed.raytrace._walls import behind, wall_hit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
-# Keys of the tallies: spheres are their number plus the coded image, walls -1 - k, escape this.
+# Keys of the tallies: spheres are their number plus the coded image, walls -1 - k, and these: out
+# of the bed, and still inside it when the distance limit ended the ray.
 ESCAPED = -(2**62)
+ENVIRONMENT = -(2**39)
 # Attempts to start a ray on exposed surface before a sphere counts as wholly buried.
 MAX_ATTEMPTS = 1000
 # Image shifts are coded in ten bits an axis; a ray that goes further counts as escaped.
@@ -110,6 +112,17 @@ def march(ox, oy, oz, dx, dy, dz, limit, frame, start, items):
                 if not frame.periodic[2] or abs(sz) > IMAGE_LIMIT:
                     break
     return nearest, found, hit_x, hit_y, hit_z
+
+
+@njit(**_OPTIONS)
+def in_bed(x, y, z, frame):
+    """Whether a point lies inside the grid; along periodic axes the bed has no end."""
+    low, edge, periodic = frame.low, frame.edge, frame.periodic
+    return (
+        (periodic[0] or low[0] <= x <= low[0] + edge[0])
+        and (periodic[1] or low[1] <= y <= low[1] + edge[1])
+        and (periodic[2] or low[2] <= z <= low[2] + edge[2])
+    )
 
 
 @njit(**_OPTIONS)

@@ -17,16 +17,18 @@ from greybed.raytrace._bundle import (
 )
 from greybed.raytrace._grid import Grid
 from greybed.raytrace._kernels import (
+    ENVIRONMENT,
     ESCAPED,
     IMAGE_SPAN,
     MAX_ATTEMPTS,
     buried,
+    in_bed,
     march,
     wrapped,
 )
 from greybed.raytrace._sobol import sphere_rays
 from greybed.raytrace._streams import GOLDEN, MIX_1, MIX_2, S32, emit, mix
-from greybed.raytrace._walls import Walls, crosses, walls_ahead
+from greybed.raytrace._walls import Walls, crosses, wall_hit, walls_ahead
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
@@ -262,6 +264,16 @@ def trace_sphere(
             continue
         if key == ESCAPED and wall[q] >= 0:
             key = np.int64(-1 - wall[q])
+        elif key == ESCAPED and limit < np.inf:
+            x = scene.centres[sphere, 0] + rays[3, k] + limit * rays[0, k]
+            y = scene.centres[sphere, 1] + rays[4, k] + limit * rays[1, k]
+            z = scene.centres[sphere, 2] + rays[5, k] + limit * rays[2, k]
+            # Between the outermost sphere and a wall is bed, too.
+            if in_bed(x, y, z, frame) or (
+                clear < np.inf
+                and wall_hit(x, y, z, rays[0, k], rays[1, k], rays[2, k], scene.walls)[1] >= 0
+            ):
+                key = np.int64(ENVIRONMENT)
         slot, place = _slot(key, keys, slots, used, mask)
         if slot == used:
             places[used] = place

@@ -93,7 +93,8 @@ def refined(
     empty = np.zeros(len(packing))
     shell = ViewFactors(
         factors=None, stderr=None, wall_factors=None, wall_stderr=None,  # type: ignore[arg-type]
-        escaped=empty, escaped_stderr=empty, buried=rows.buried, areas=areas, rays=enough,
+        escaped=empty, escaped_stderr=empty, environment=empty, environment_stderr=empty,
+        buried=rows.buried, areas=areas, rays=enough,
         seed=seed, seconds=time.perf_counter() - begin, cost=cost,
     )  # fmt: skip
     return scattered(exchange, shell)
@@ -227,10 +228,12 @@ def _pairs(
         cost += (0.5 * np.bincount(low[which], lines.lines, n)).astype(np.int64)
         cost += (0.5 * np.bincount(high[which], lines.lines, n)).astype(np.int64)
     summed, spread = of_entries(twice * value), of_entries(twice**2 * variance)
-    outside = np.zeros((n, packing.n_walls + 1))
+    outside = np.zeros((n, packing.n_walls + 2))
     out_error = np.broadcast_to(standard_error(0, rows.rays)[:, None], outside.shape).copy()
     beyond = ~seen
-    column = np.where(rows.key[beyond] == _kernels.ESCAPED, packing.n_walls, -1 - rows.key[beyond])
+    column = -1 - rows.key[beyond]
+    column[rows.key[beyond] == _kernels.ESCAPED] = packing.n_walls
+    column[rows.key[beyond] == _kernels.ENVIRONMENT] = packing.n_walls + 1
     outside[rows.emitter[beyond], column] = rows.value[beyond]
     out_error[rows.emitter[beyond], column] = rows.error[beyond]
     scale = areas[:, None]

@@ -48,8 +48,8 @@ class Exchange:
         Spheres, i <= j; a sphere and its own images once, with i = j.
     value, variance : (m,) arrays
         A_i F_ij [m2] and its variance [m4].
-    outside, outside_variance : (n, n_walls + 1) arrays
-        The same to walls, and to the opening in the last column.
+    outside, outside_variance : (n, n_walls + 2) arrays
+        The same to walls, to the opening, and to the surroundings beyond a distance limit.
     areas : (n,) array
         What the rows add up to [m2].
     """
@@ -197,8 +197,10 @@ def gathered(result: ViewFactors) -> Exchange:
     n = len(result.areas)
     f = result.factors.tocoo()
     i, j = f.row.astype(np.int64), f.col.astype(np.int64)
-    outside = np.hstack([result.wall_factors, result.escaped[:, None]])
-    out_error = np.hstack([result.wall_stderr, result.escaped_stderr[:, None]])
+    outside = np.column_stack([result.wall_factors, result.escaped, result.environment])
+    out_error = np.column_stack(
+        [result.wall_stderr, result.escaped_stderr, result.environment_stderr]
+    )
     out_var = np.where(outside > 0.0, out_error**2, 0.0)
     error = result.stderr.tocoo().data
     a = result.areas
@@ -260,9 +262,11 @@ def scattered(exchange: Exchange, result: ViewFactors) -> ViewFactors:
         result,
         factors=sparse.csr_array((value, (rows, cols)), shape=(n, n)),
         stderr=sparse.csr_array((error, (rows, cols)), shape=(n, n)),
-        wall_factors=outside[:, :-1],
-        wall_stderr=out_error[:, :-1],
-        escaped=outside[:, -1],
-        escaped_stderr=out_error[:, -1],
+        wall_factors=outside[:, :-2],
+        wall_stderr=out_error[:, :-2],
+        escaped=outside[:, -2],
+        escaped_stderr=out_error[:, -2],
+        environment=outside[:, -1],
+        environment_stderr=out_error[:, -1],
         reciprocal=True,
     )

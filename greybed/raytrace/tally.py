@@ -42,7 +42,8 @@ class Tally:
         Emitting sphere.
     key : (m,) int64
         Sphere (with its coded image above bit 32 where images were kept), -1 - k for wall k of
-        the packing, or ``ESCAPED``.
+        the packing, ``ESCAPED``, or ``ENVIRONMENT`` for rays that the distance limit ended
+        inside the bed.
     count : (m,) int64
         Rays.
     squares : (m,) int64
@@ -112,7 +113,7 @@ def trace(
     images : bool
         Keep apart the periodic images of a target.
     max_distance : float
-        Rays that meet nothing within it count as escaped [m].
+        Rays end there [m].
     sampling : str
         ``sobol``: scrambled quasi-random rays in 16 independent replicates, or more where one
         would exceed 16,384 rays; ``random``: every ray on its own.

@@ -24,14 +24,18 @@ class ViewFactors:
     Attributes
     ----------
     factors : csr_array, shape (n, n)
-        Sphere to sphere [-], periodic images summed. Row i, all ``wall_factors[i]`` and
-        ``escaped[i]`` add up to one.
+        Sphere to sphere [-], periodic images summed. Row i, all ``wall_factors[i]``,
+        ``escaped[i]`` and ``environment[i]`` add up to one.
     stderr : csr_array, shape (n, n)
         Standard errors of ``factors`` [-], same pattern.
     wall_factors, wall_stderr : ndarray, shape (n, n_walls)
         Sphere to wall, in the order of ``packing.walls`` [-].
     escaped, escaped_stderr : ndarray, shape (n,)
-        Fraction that meets nothing, and its standard error [-].
+        Fraction that leaves the bed, and its standard error [-].
+    environment, environment_stderr : ndarray, shape (n,)
+        Fraction still under way inside the bed at the distance limit, and its standard error [-];
+        0 without a limit. It belongs to the surroundings of the sphere: solvers give it the local
+        mean, see :func:`greybed.core.rows.localised`.
     buried : ndarray, shape (n,)
         Fraction of the surface inside other spheres or walls [-]. Rays start on the rest.
     areas : ndarray, shape (n,)
@@ -55,6 +59,8 @@ class ViewFactors:
     wall_stderr: Array
     escaped: Array
     escaped_stderr: Array
+    environment: Array
+    environment_stderr: Array
     buried: Array
     areas: Array
     rays: int
@@ -104,7 +110,8 @@ def view_factors(
     emitters : array_like of int, optional
         Trace only from these spheres; the other rows are empty (walls, escape: NaN).
     max_distance : float
-        Rays that meet nothing within it count as escaped [m].
+        Rays that meet nothing within it end there and count as ``environment``, or as ``escaped``
+        where they have left the bed by then [m].
     sampling : {"sobol", "random"}
         Scrambled quasi-random rays, or independent ones.
     smooth : bool
@@ -173,23 +180,27 @@ def view_factors(
     shape = (n, n)
     factors = sparse.csr_array((hits / counts.rays, index, start), shape=shape)
     errors = sparse.csr_array((error[to_sphere], index, start), shape=shape)
-    walls = np.where(traced[:, None], 0.0, np.full((n, packing.n_walls), np.nan))
-    escaped = np.where(traced, 0.0, np.nan)
-    lost = counts.key == _kernels.ESCAPED
-    escaped[counts.emitter[lost]] = counts.count[lost] / counts.rays
-    at_wall = (counts.key < 0) & ~lost
-    walls[counts.emitter[at_wall], -1 - counts.key[at_wall]] = counts.count[at_wall] / counts.rays
-    wall_errors = np.where(traced[:, None], standard_error(0, counts.rays), walls)
-    wall_errors[counts.emitter[at_wall], -1 - counts.key[at_wall]] = error[at_wall]
-    escape_errors = np.where(traced, standard_error(0, counts.rays), np.nan)
-    escape_errors[counts.emitter[lost]] = error[lost]
+    # Walls, then what leaves, then what the limit ends: a column each.
+    inside = counts.key < 0
+    column = -1 - counts.key
+    column[counts.key == _kernels.ESCAPED] = packing.n_walls
+    column[counts.key == _kernels.ENVIRONMENT] = packing.n_walls + 1
+    outside = np.full((n, packing.n_walls + 2), np.nan)
+    outside[traced] = 0.0
+    outside[counts.emitter[inside], column[inside]] = counts.count[inside] / counts.rays
+    out_error = np.where(traced[:, None], standard_error(0, counts.rays), outside)
+    out_error[counts.emitter[inside], column[inside]] = error[inside]
+    if np.isinf(max_distance):
+        out_error[traced, -1] = 0.0
     result = ViewFactors(
         factors=factors,
         stderr=errors,
-        wall_factors=walls,
-        wall_stderr=wall_errors,
-        escaped=escaped,
-        escaped_stderr=escape_errors,
+        wall_factors=outside[:, :-2],
+        wall_stderr=out_error[:, :-2],
+        escaped=outside[:, -2],
+        escaped_stderr=out_error[:, -2],
+        environment=outside[:, -1],
+        environment_stderr=out_error[:, -1],
         buried=counts.buried,
         areas=packing.areas * (1.0 - counts.buried),
         rays=counts.rays,

@@ -15,12 +15,13 @@ import numpy as np
 import pytest
 
 from greybed.cli.main import main
-from greybed.cli.trace import STATE, parse_walls
+from greybed.cli.trace import parse_walls
 from greybed.core import Cone, Cylinder, Disc, InputError, Packing, Plane, Polygon, box_walls
 from greybed.core.writers import write_packing
 from greybed.datasets.factors_file import read_factors
 from greybed.datasets.generate import random_packing
 from greybed.datasets.sizes import Uniform
+from greybed.datasets.tracing import STATE
 from greybed.raytrace import view_factors
 
 # Six chunks of some tenths of a second: time to kill between them.
@@ -148,7 +149,8 @@ def test_summary_walls_and_overlaps(tmp_path, capsys):
     assert summary["provenance"]["seed"] == summary["seed"] == 0
     assert set(summary["mean_to_walls"]) == {"plane_1", "cylinder_2"}
     parts = summary["mean_row_sum_to_spheres"] + sum(summary["mean_to_walls"].values())
-    assert parts + summary["mean_escaped"] == pytest.approx(1.0, abs=1e-12)
+    parts += summary["mean_escaped"] + summary["mean_environment"]
+    assert parts == pytest.approx(1.0, abs=1e-12)
     assert summary["overlapping_pairs"] == 1
     # A cap of height 0.1 r buries 5 % of each sphere.
     assert summary["buried_fraction_mean"] == pytest.approx(0.05, abs=0.01)

@@ -94,13 +94,23 @@ def test_coaxial_discs_in_a_closed_can():
     assert result.escaped[0] == 0.0
 
 
-def test_max_distance_lets_rays_escape():
+def test_rays_at_the_distance_limit_are_in_the_bed_or_out_of_it():
+    """In the bed: between the outermost spheres, or with a wall still ahead."""
     pair = Packing([[0, 0, 0], [3, 0, 0]], 1.0, walls=[Plane((0, 0, -2), (0, 0, 1))])
     free = view_factors(pair, rays=20_000)
+    assert (free.environment == 0.0).all()
+    assert (free.environment_stderr == 0.0).all()
     near = view_factors(pair, rays=20_000, max_distance=0.99)
     assert near.factors.nnz == 0
     assert near.wall_factors.sum() == 0.0
-    assert (near.escaped == 1.0).all()
+    np.testing.assert_allclose(near.escaped + near.environment, 1.0, rtol=0, atol=1e-15)
+    rng = np.random.default_rng(5)
+    normal, turn = rng.normal(size=(2, 200_000, 3))
+    normal, turn = (v / np.linalg.norm(v, axis=1)[:, None] for v in (normal, turn))
+    ray = (normal + turn) / np.linalg.norm(normal + turn, axis=1)[:, None]
+    end = normal + 0.99 * ray
+    inside = (end[:, 0] > -1) & (end[:, 0] < 4) & (abs(end[:, 1:]) < 1).all(axis=1)
+    assert near.environment[0] == pytest.approx((inside | (ray[:, 2] < 0)).mean(), abs=0.005)
     far = view_factors(pair, rays=20_000, max_distance=1e9)
     assert (far.factors != free.factors).nnz == 0
 

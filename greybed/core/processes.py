@@ -1,0 +1,83 @@
+"""Processes that work beside this one: started, fed a few jobs ahead, and ended with it."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from itertools import islice
+from multiprocessing import connection, get_context, parent_process
+from typing import Any
+
+from greybed.core.errors import OutputError
+
+
+def processes(
+    count: int, start: Callable[..., None] | None = None, about: tuple[Any, ...] = ()
+) -> ProcessPoolExecutor:
+    """A pool of ``count`` processes, each of which calls ``start(*about)`` first.
+
+    They end when this process ends, also when it is killed.
+    """
+    # Spawned, because a fork of a process with threads may hang.
+    return ProcessPoolExecutor(
+        count, mp_context=get_context("spawn"), initializer=_begin, initargs=(start, about)
+    )
+
+
+def _begin(start: Callable[..., None] | None, about: tuple[Any, ...]) -> None:
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    if start is not None:
+        start(*about)
+
+
+def _end_with_parent() -> None:
+    # A killed parent closes no queue: its children would wait for work forever.
+    parent = parent_process()
+    if parent is not None:
+        connection.wait([parent.sentinel])
+        os._exit(1)
+
+
+def finished(
+    executor: Executor, task: Callable[..., Any], jobs: Iterable[tuple[Any, ...]], ahead: int
+) -> Iterator[tuple[tuple[Any, ...], Any]]:
+    """Jobs with their results, in the order in which they are finished.
+
+    Parameters
+    ----------
+    executor : Executor
+        Where ``task(*job)`` runs.
+    task : callable
+        The work, a function of a module.
+    jobs : iterable of tuple
+        Arguments.
+    ahead : int
+        Jobs handed out at once: the results of so many may wait in memory [-].
+
+    Raises
+    ------
+    OutputError
+        If a process was killed from outside, as systems do that run out of memory.
+    """
+    waiting: dict[Future[Any], tuple[Any, ...]] = {}
+    queue = iter(jobs)
+    try:
+        while True:
+            for job in islice(queue, ahead - len(waiting)):
+                waiting[executor.submit(task, *job)] = job
+            if not waiting:
+                return
+            done, _ = wait(waiting, return_when=FIRST_COMPLETED)
+            for future in done:
+                yield waiting.pop(future), future.result()
+    except BrokenProcessPool:
+        raise OutputError(
+            "a worker process was killed from outside, perhaps because memory ran out; give the "
+            "same command with fewer workers: what was finished is kept."
+        ) from None
+    except BaseException:  # Ctrl-C must not wait for the jobs that have not begun
+        executor.shutdown(wait=False, cancel_futures=True)
+        raise
