@@ -25,7 +25,7 @@ from greybed.raytrace._kernels import (
     wrapped,
 )
 from greybed.raytrace._sobol import sphere_rays
-from greybed.raytrace._streams import GOLDEN, MIX_1, MIX_2, S32, emit, mix
+from greybed.raytrace._streams import GOLDEN, MIX_2, draw, mix, replicate_seeds, stream_of
 from greybed.raytrace._walls import Walls, crosses, walls_ahead
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
@@ -36,7 +36,7 @@ _FAR = 2**40
 
 
 @njit(**_OPTIONS)
-def _slot(key, keys, slots, used, mask):
+def slot_for(key, keys, slots, used, mask):
     """Slot of a key in an open-addressing table; ``used`` where it is new."""
     place = np.int64(mix(np.uint64(key)) & np.uint64(mask))
     while slots[place] >= 0:
@@ -59,6 +59,23 @@ def _key(sphere, x, y, z, images):
 
 
 @njit(**_OPTIONS)
+def redraw(stream, number, sphere, radius, scene, rays, k):
+    """Draw ray ``number``, in column ``k``, again until it starts on exposed surface.
+
+    Returns the rejected starts, -1 where there seems to be no such surface.
+    """
+    # After the draw of the ray itself, so that redrawn starts are new ones.
+    state = mix(stream + np.uint64(number) * GOLDEN) ^ MIX_2
+    attempts = 0
+    while _hidden_start(sphere, rays[3, k], rays[4, k], rays[5, k], radius, scene):
+        attempts += 1
+        if attempts == MAX_ATTEMPTS:
+            return -1
+        state = draw(state, rays, k)
+    return attempts
+
+
+@njit(**_OPTIONS)
 def _start_rays(sphere, first, last, offsets, seed, quasi, points, radius, hidden, scene, rays):
     """Rays of replicates ``first`` to ``last`` in columns from 0 on; returns rejected starts.
 
@@ -66,38 +83,25 @@ def _start_rays(sphere, first, last, offsets, seed, quasi, points, radius, hidde
     scrambled sequence; else ray k draws from a stream of its own. Starts on buried surface are
     drawn again from such a stream; -1 where the whole sphere is buried.
     """
-    stream = mix(np.uint64(seed) * MIX_1 + mix(np.uint64(sphere) + GOLDEN))
+    stream = stream_of(sphere, seed)
     begin = offsets[first]
     n = offsets[last] - begin
     if quasi:
         seeds = np.empty(4, np.uint32)
         for r in range(first, last):
-            state = mix(stream ^ mix(np.uint64(r) + MIX_2))
-            for k in range(4):
-                state += GOLDEN
-                seeds[k] = np.uint32(mix(state) >> S32)
+            replicate_seeds(stream, r, seeds)
             sphere_rays(points, offsets[r + 1] - offsets[r], seeds, rays, offsets[r] - begin)
     else:
         for k in range(n):
-            state = mix(stream + np.uint64(begin + k) * GOLDEN)
-            dx, dy, dz, px, py, pz, state = emit(state)
-            rays[0, k], rays[1, k], rays[2, k] = dx, dy, dz
-            rays[3, k], rays[4, k], rays[5, k] = px, py, pz
+            draw(mix(stream + np.uint64(begin + k) * GOLDEN), rays, k)
     if not hidden:
         return 0
     rejected = 0
     for k in range(n):
-        # After the draw of the ray itself, so that redrawn starts are new ones.
-        state = mix(stream + np.uint64(begin + k) * GOLDEN) ^ MIX_2
-        attempt = 0
-        while _hidden_start(sphere, rays[3, k], rays[4, k], rays[5, k], radius, scene):
-            attempt += 1
-            if attempt == MAX_ATTEMPTS:
-                return -1
-            dx, dy, dz, px, py, pz, state = emit(state)
-            rays[0, k], rays[1, k], rays[2, k] = dx, dy, dz
-            rays[3, k], rays[4, k], rays[5, k] = px, py, pz
-        rejected += attempt
+        attempts = redraw(stream, begin + k, sphere, radius, scene, rays, k)
+        if attempts < 0:
+            return -1
+        rejected += attempts
     return rejected
 
 
@@ -128,7 +132,7 @@ class Tables(NamedTuple):
 
 
 @njit(**_OPTIONS)
-def _march_on(
+def march_on(
     m, pending, rays, ahead, bound, centre, images, frame, start, items, owner, image, key
 ):
     """Keys of what ``m`` pending rays meet that have come ``ahead`` [m] freely.
@@ -216,7 +220,7 @@ def trace_sphere(
         key = _key(
             around.sphere[p], around.image[0, p], around.image[1, p], around.image[2, p], images
         )
-        slot, place = _slot(key, keys, slots, used, mask)
+        slot, place = slot_for(key, keys, slots, used, mask)
         if slot == used:
             places[used] = place
             for r in range(replicates):
@@ -249,7 +253,7 @@ def trace_sphere(
             # Known already, but for the wall: nothing left to march for.
             ahead[q] = np.inf
     frame, start, items, owner, image = scene.grid
-    _march_on(
+    march_on(
         m, pending, rays, ahead, bound, scene.centres[sphere], images, frame, start, items, owner,
         image, key_of,
     )  # fmt: skip
@@ -262,7 +266,7 @@ def trace_sphere(
             continue
         if key == ESCAPED and wall[q] >= 0:
             key = np.int64(-1 - wall[q])
-        slot, place = _slot(key, keys, slots, used, mask)
+        slot, place = slot_for(key, keys, slots, used, mask)
         if slot == used:
             places[used] = place
             for r in range(replicates):
@@ -299,7 +303,7 @@ class Work(NamedTuple):
 
 
 @njit(**_OPTIONS)
-def _room(rays, replicates):
+def room_for_tasks(rays, replicates):
     """Scratch for tasks of up to ``rays`` rays."""
     most = rays + MOST
     size = 1
@@ -347,6 +351,33 @@ def _in_order(found, images):
 
 
 @njit(**_OPTIONS)
+def store(used, replicates, images, work, filled, out_keys, out_counts, out_squares):
+    """Write the ``used`` slots of one task, sorted by key, from ``filled`` on, and free them.
+
+    Returns the new end of the output, -1 where they do not fit.
+    """
+    if filled + used > out_keys.size:
+        return -1
+    found = work.keys[work.places[:used]]
+    order = _in_order(found, images)
+    for m in range(used):
+        slot = order[m]
+        total, squares = 0, 0
+        for r in range(replicates):
+            c = np.int64(work.counts[slot, r])
+            total += c
+            squares += c * c
+        if total > 0:
+            out_keys[filled] = found[slot]
+            out_counts[filled] = total
+            out_squares[filled] = squares
+            filled += 1
+    for m in range(used):
+        work.slots[work.places[m]] = -1
+    return filled
+
+
+@njit(**_OPTIONS)
 def trace_block(
     tasks, offsets, seed, quasi, points, images, scene, limit, most_rays, most_replicates,
     out_keys, out_counts, out_squares, ends, rejected,
@@ -357,7 +388,7 @@ def trace_block(
     the replicates' rays. Returns the number of tasks done; fewer than asked where the output is
     full.
     """
-    work = _room(most_rays, most_replicates)
+    work = room_for_tasks(most_rays, most_replicates)
     around = room_for_neighbours()
     filled = 0
     for k in range(tasks.shape[0]):
@@ -366,23 +397,8 @@ def trace_block(
             tasks[k, 0], tasks[k, 1], tasks[k, 2], offsets, seed, quasi, points, images, scene,
             limit, work, around,
         )  # fmt: skip
-        if filled + used > out_keys.size:
+        filled = store(used, replicates, images, work, filled, out_keys, out_counts, out_squares)
+        if filled < 0:
             return k
-        found = work.keys[work.places[:used]]
-        order = _in_order(found, images)
-        for m in range(used):
-            slot = order[m]
-            total, squares = 0, 0
-            for r in range(replicates):
-                c = np.int64(work.counts[slot, r])
-                total += c
-                squares += c * c
-            if total > 0:
-                out_keys[filled] = found[slot]
-                out_counts[filled] = total
-                out_squares[filled] = squares
-                filled += 1
-        for m in range(used):
-            work.slots[work.places[m]] = -1
         ends[k] = filled
     return tasks.shape[0]
