@@ -19,14 +19,13 @@ from greybed.raytrace._grid import Grid
 from greybed.raytrace._kernels import (
     ESCAPED,
     IMAGE_SPAN,
-    MAX_ATTEMPTS,
-    buried,
     march,
+    redraw,
     wrapped,
 )
 from greybed.raytrace._sobol import sphere_rays
-from greybed.raytrace._streams import GOLDEN, MIX_2, draw, mix, replicate_seeds, stream_of
-from greybed.raytrace._walls import Walls, crosses, walls_ahead
+from greybed.raytrace._streams import GOLDEN, draw, mix, replicate_seeds, stream_of
+from greybed.raytrace._walls import Walls, walls_ahead
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
@@ -59,23 +58,6 @@ def _key(sphere, x, y, z, images):
 
 
 @njit(**_OPTIONS)
-def redraw(stream, number, sphere, radius, scene, rays, k):
-    """Draw ray ``number``, in column ``k``, again until it starts on exposed surface.
-
-    Returns the rejected starts, -1 where there seems to be no such surface.
-    """
-    # After the draw of the ray itself, so that redrawn starts are new ones.
-    state = mix(stream + np.uint64(number) * GOLDEN) ^ MIX_2
-    attempts = 0
-    while _hidden_start(sphere, rays[3, k], rays[4, k], rays[5, k], radius, scene):
-        attempts += 1
-        if attempts == MAX_ATTEMPTS:
-            return -1
-        state = draw(state, rays, k)
-    return attempts
-
-
-@njit(**_OPTIONS)
 def _start_rays(sphere, first, last, offsets, seed, quasi, points, radius, hidden, scene, rays):
     """Rays of replicates ``first`` to ``last`` in columns from 0 on; returns rejected starts.
 
@@ -103,20 +85,6 @@ def _start_rays(sphere, first, last, offsets, seed, quasi, points, radius, hidde
             return -1
         rejected += attempts
     return rejected
-
-
-@njit(**_OPTIONS)
-def _hidden_start(sphere, px, py, pz, radius, scene):
-    """Whether a place of the unit sphere, put on ``sphere``, is buried."""
-    frame = scene.grid.frame
-    low, edge, periodic = frame.low, frame.edge, frame.periodic
-    centre = scene.centres[sphere]
-    x, _ = wrapped(centre[0] + radius * px, low[0], edge[0], periodic[0])
-    y, _ = wrapped(centre[1] + radius * py, low[1], edge[1], periodic[1])
-    z, _ = wrapped(centre[2] + radius * pz, low[2], edge[2], periodic[2])
-    if buried(x, y, z, frame, scene.grid.start, scene.grid.items, scene.walls):
-        return True
-    return crosses(centre[0], centre[1], centre[2], x, y, z, scene.walls)
 
 
 class Tables(NamedTuple):

@@ -6,8 +6,8 @@ import numpy as np
 from numba import njit
 
 from greybed.raytrace._grid import Grid
-from greybed.raytrace._kernels import ESCAPED
-from greybed.raytrace._rows import march_on, redraw, room_for_tasks, slot_for, store
+from greybed.raytrace._kernels import ESCAPED, redraw
+from greybed.raytrace._rows import march_on, room_for_tasks, slot_for, store
 from greybed.raytrace._sobol import sphere_rays
 from greybed.raytrace._streams import GOLDEN, draw, mix, replicate_seeds, stream_of
 from greybed.raytrace._walls import Walls, walls_ahead
@@ -116,9 +116,7 @@ def tally_block(
                         counts[used, q] = 0
                     used += 1
                 counts[slot, r - first] += 1
-        filled = store(
-            used, last - first, images, work, filled, out_keys, out_counts, out_squares
-        )
+        filled = store(used, last - first, images, work, filled, out_keys, out_counts, out_squares)
         if filled < 0:
             return k
         ends[k] = filled

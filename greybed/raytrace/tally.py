@@ -216,9 +216,7 @@ class _Job:
         from greybed.raytrace.cuda import Device
 
         device = Device(self.scene.tables)
-        return replace(
-            self, trace_block=device.trace_block, rays_per_block=device.rays_per_launch
-        )
+        return replace(self, trace_block=device.trace_block, rays_per_block=device.rays_per_launch)
 
     @property
     def replicates(self) -> int:
