@@ -140,20 +140,25 @@ def _bytes(value: Any) -> int:
 
 
 def _numba_cuda() -> Any:
-    """``numba.cuda``, where it can be imported and finds a device."""
+    """``numba.cuda`` of numba-cuda, where it is installed and finds a device."""
     install = "pip install 'greybed[gpu]'"
     try:
-        from numba import cuda
+        from numba import config, cuda
     except ImportError as error:
         raise InputError(
-            f"device = 'cuda' needs numba-cuda, which cannot be imported ({error}); {install}, "
-            f"{_REMEDY}."
+            f"device = 'cuda' needs numba-cuda, which cannot be imported ({_one_line(error)}); "
+            f"{install}, {_REMEDY}."
         ) from None
+    # What numba itself still brings is no longer maintained and fails to compile the kernel.
+    if cuda.implementation != "NVIDIA" and not config.ENABLE_CUDASIM:
+        raise InputError(
+            f"device = 'cuda' needs numba-cuda, which is not installed; {install}, {_REMEDY}."
+        )
     if not cuda.is_available():
         reason = cuda.cuda_error() or "its driver answers, the compiler NVVM does not"
         raise InputError(
             f"device = 'cuda' finds no CUDA device ({_one_line(reason)}); take a machine with an "
-            f"NVIDIA GPU and its driver and {install}, {_REMEDY}."
+            f"NVIDIA GPU and its driver, {_REMEDY}."
         )
     return cuda
 

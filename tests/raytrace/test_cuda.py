@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 
+import numba.cuda
 import numpy as np
 import pytest
 
@@ -141,9 +142,7 @@ def test_simulated_device_gives_the_same_counts():
 
 
 def has_device():
-    from numba import cuda as numba_cuda
-
-    return numba_cuda.is_available()
+    return numba.cuda.implementation == "NVIDIA" and numba.cuda.is_available()
 
 
 def test_real_device_gives_the_same_counts():
@@ -162,19 +161,24 @@ def test_real_device_gives_the_same_counts():
         assert sum(map(abs, moved.values())) <= 2 * (2 + wanted.count.sum() // 1_000_000)
 
 
-def test_no_device_is_refused():
+def test_no_device_is_refused(monkeypatch):
     if has_device():
         pytest.skip("there is a CUDA device")
+    monkeypatch.setattr(numba.cuda, "implementation", "NVIDIA")
     with pytest.raises(InputError, match=r"finds no CUDA device \(.+\); .*or give device='cpu'"):
         view_factors(PAIR, rays=10, device="cuda")
 
 
-def test_without_numba_cuda_refused(monkeypatch):
-    import numba
-
-    monkeypatch.delattr(numba, "cuda", raising=False)
-    monkeypatch.setitem(sys.modules, "numba.cuda", None)
-    with pytest.raises(InputError, match=r"needs numba-cuda.*pip install 'greybed\[gpu\]', or"):
+@pytest.mark.parametrize("there", [True, False])
+def test_without_numba_cuda_refused(there, monkeypatch):
+    if there:
+        monkeypatch.setattr(numba.cuda, "implementation", "Built-in")
+    else:
+        monkeypatch.delattr(numba, "cuda")
+        monkeypatch.setitem(sys.modules, "numba.cuda", None)
+    what = "is not installed" if there else r"cannot be imported \(.+\)"
+    message = rf"needs numba-cuda, which {what}; pip install 'greybed\[gpu\]', or give device='cpu'"
+    with pytest.raises(InputError, match=message):
         view_factors(PAIR, rays=10, device="cuda")
 
 
