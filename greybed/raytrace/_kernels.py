@@ -5,7 +5,8 @@ import math
 import numpy as np
 from numba import njit
 
-from greybed.raytrace._walls import behind, wall_hit
+from greybed.raytrace._streams import GOLDEN, MIX_2, draw, mix
+from greybed.raytrace._walls import behind, crosses, wall_hit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
@@ -152,6 +153,37 @@ def wrapped(position, low, edge, periodic):
         while position >= low + edge:
             position, boxes = position - edge, boxes + 1
     return position, boxes
+
+
+@njit(**_OPTIONS)
+def _hidden_start(sphere, px, py, pz, radius, scene):
+    """Whether a place of the unit sphere, put on ``sphere``, is buried."""
+    frame = scene.grid.frame
+    low, edge, periodic = frame.low, frame.edge, frame.periodic
+    centre = scene.centres[sphere]
+    x, _ = wrapped(centre[0] + radius * px, low[0], edge[0], periodic[0])
+    y, _ = wrapped(centre[1] + radius * py, low[1], edge[1], periodic[1])
+    z, _ = wrapped(centre[2] + radius * pz, low[2], edge[2], periodic[2])
+    if buried(x, y, z, frame, scene.grid.start, scene.grid.items, scene.walls):
+        return True
+    return crosses(centre[0], centre[1], centre[2], x, y, z, scene.walls)
+
+
+@njit(**_OPTIONS)
+def redraw(stream, number, sphere, radius, scene, rays, k):
+    """Draw ray ``number``, in column ``k``, again until it starts on exposed surface.
+
+    Returns the rejected starts, -1 where there seems to be no such surface.
+    """
+    # After the draw of the ray itself, so that redrawn starts are new ones.
+    state = mix(stream + np.uint64(number) * GOLDEN) ^ MIX_2
+    attempts = 0
+    while _hidden_start(sphere, rays[3, k], rays[4, k], rays[5, k], radius, scene):
+        attempts += 1
+        if attempts == MAX_ATTEMPTS:
+            return -1
+        state = draw(state, rays, k)
+    return attempts
 
 
 @njit(**_OPTIONS)

@@ -20,15 +20,14 @@ from greybed.raytrace._kernels import (
     ENVIRONMENT,
     ESCAPED,
     IMAGE_SPAN,
-    MAX_ATTEMPTS,
-    buried,
     in_bed,
     march,
+    redraw,
     wrapped,
 )
 from greybed.raytrace._sobol import sphere_rays
-from greybed.raytrace._streams import GOLDEN, MIX_1, MIX_2, S32, emit, mix
-from greybed.raytrace._walls import Walls, crosses, wall_hit, walls_ahead
+from greybed.raytrace._streams import GOLDEN, draw, mix, replicate_seeds, stream_of
+from greybed.raytrace._walls import Walls, wall_hit, walls_ahead
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
@@ -38,7 +37,7 @@ _FAR = 2**40
 
 
 @njit(**_OPTIONS)
-def _slot(key, keys, slots, used, mask):
+def slot_for(key, keys, slots, used, mask):
     """Slot of a key in an open-addressing table; ``used`` where it is new."""
     place = np.int64(mix(np.uint64(key)) & np.uint64(mask))
     while slots[place] >= 0:
@@ -68,53 +67,26 @@ def _start_rays(sphere, first, last, offsets, seed, quasi, points, radius, hidde
     scrambled sequence; else ray k draws from a stream of its own. Starts on buried surface are
     drawn again from such a stream; -1 where the whole sphere is buried.
     """
-    stream = mix(np.uint64(seed) * MIX_1 + mix(np.uint64(sphere) + GOLDEN))
+    stream = stream_of(sphere, seed)
     begin = offsets[first]
     n = offsets[last] - begin
     if quasi:
         seeds = np.empty(4, np.uint32)
         for r in range(first, last):
-            state = mix(stream ^ mix(np.uint64(r) + MIX_2))
-            for k in range(4):
-                state += GOLDEN
-                seeds[k] = np.uint32(mix(state) >> S32)
+            replicate_seeds(stream, r, seeds)
             sphere_rays(points, offsets[r + 1] - offsets[r], seeds, rays, offsets[r] - begin)
     else:
         for k in range(n):
-            state = mix(stream + np.uint64(begin + k) * GOLDEN)
-            dx, dy, dz, px, py, pz, state = emit(state)
-            rays[0, k], rays[1, k], rays[2, k] = dx, dy, dz
-            rays[3, k], rays[4, k], rays[5, k] = px, py, pz
+            draw(mix(stream + np.uint64(begin + k) * GOLDEN), rays, k)
     if not hidden:
         return 0
     rejected = 0
     for k in range(n):
-        # After the draw of the ray itself, so that redrawn starts are new ones.
-        state = mix(stream + np.uint64(begin + k) * GOLDEN) ^ MIX_2
-        attempt = 0
-        while _hidden_start(sphere, rays[3, k], rays[4, k], rays[5, k], radius, scene):
-            attempt += 1
-            if attempt == MAX_ATTEMPTS:
-                return -1
-            dx, dy, dz, px, py, pz, state = emit(state)
-            rays[0, k], rays[1, k], rays[2, k] = dx, dy, dz
-            rays[3, k], rays[4, k], rays[5, k] = px, py, pz
-        rejected += attempt
+        attempts = redraw(stream, begin + k, sphere, radius, scene, rays, k)
+        if attempts < 0:
+            return -1
+        rejected += attempts
     return rejected
-
-
-@njit(**_OPTIONS)
-def _hidden_start(sphere, px, py, pz, radius, scene):
-    """Whether a place of the unit sphere, put on ``sphere``, is buried."""
-    frame = scene.grid.frame
-    low, edge, periodic = frame.low, frame.edge, frame.periodic
-    centre = scene.centres[sphere]
-    x, _ = wrapped(centre[0] + radius * px, low[0], edge[0], periodic[0])
-    y, _ = wrapped(centre[1] + radius * py, low[1], edge[1], periodic[1])
-    z, _ = wrapped(centre[2] + radius * pz, low[2], edge[2], periodic[2])
-    if buried(x, y, z, frame, scene.grid.start, scene.grid.items, scene.walls):
-        return True
-    return crosses(centre[0], centre[1], centre[2], x, y, z, scene.walls)
 
 
 class Tables(NamedTuple):
@@ -130,7 +102,7 @@ class Tables(NamedTuple):
 
 
 @njit(**_OPTIONS)
-def _march_on(
+def march_on(
     m, pending, rays, ahead, bound, centre, images, frame, start, items, owner, image, key
 ):
     """Keys of what ``m`` pending rays meet that have come ``ahead`` [m] freely.
@@ -163,6 +135,19 @@ def _march_on(
                 sz + mz + np.int64(image[3 * item + 2]),
                 images,
             )
+
+
+@njit(**_OPTIONS)
+def at_limit(rays, k, centre, limit, clear, frame, walls):
+    """Key of a ray that met nothing up to the distance limit: the environment inside the bed."""
+    dx, dy, dz = rays[0, k], rays[1, k], rays[2, k]
+    x = centre[0] + rays[3, k] + limit * dx
+    y = centre[1] + rays[4, k] + limit * dy
+    z = centre[2] + rays[5, k] + limit * dz
+    # Between the outermost sphere and a wall is bed, too.
+    if in_bed(x, y, z, frame) or (clear < np.inf and wall_hit(x, y, z, dx, dy, dz, walls)[1] >= 0):
+        return np.int64(ENVIRONMENT)
+    return np.int64(ESCAPED)
 
 
 @njit(**_OPTIONS)
@@ -218,7 +203,7 @@ def trace_sphere(
         key = _key(
             around.sphere[p], around.image[0, p], around.image[1, p], around.image[2, p], images
         )
-        slot, place = _slot(key, keys, slots, used, mask)
+        slot, place = slot_for(key, keys, slots, used, mask)
         if slot == used:
             places[used] = place
             for r in range(replicates):
@@ -251,7 +236,7 @@ def trace_sphere(
             # Known already, but for the wall: nothing left to march for.
             ahead[q] = np.inf
     frame, start, items, owner, image = scene.grid
-    _march_on(
+    march_on(
         m, pending, rays, ahead, bound, scene.centres[sphere], images, frame, start, items, owner,
         image, key_of,
     )  # fmt: skip
@@ -265,16 +250,8 @@ def trace_sphere(
         if key == ESCAPED and wall[q] >= 0:
             key = np.int64(-1 - wall[q])
         elif key == ESCAPED and limit < np.inf:
-            x = scene.centres[sphere, 0] + rays[3, k] + limit * rays[0, k]
-            y = scene.centres[sphere, 1] + rays[4, k] + limit * rays[1, k]
-            z = scene.centres[sphere, 2] + rays[5, k] + limit * rays[2, k]
-            # Between the outermost sphere and a wall is bed, too.
-            if in_bed(x, y, z, frame) or (
-                clear < np.inf
-                and wall_hit(x, y, z, rays[0, k], rays[1, k], rays[2, k], scene.walls)[1] >= 0
-            ):
-                key = np.int64(ENVIRONMENT)
-        slot, place = _slot(key, keys, slots, used, mask)
+            key = at_limit(rays, k, scene.centres[sphere], limit, clear, frame, scene.walls)
+        slot, place = slot_for(key, keys, slots, used, mask)
         if slot == used:
             places[used] = place
             for r in range(replicates):
@@ -311,7 +288,7 @@ class Work(NamedTuple):
 
 
 @njit(**_OPTIONS)
-def _room(rays, replicates):
+def room_for_tasks(rays, replicates):
     """Scratch for tasks of up to ``rays`` rays."""
     most = rays + MOST
     size = 1
@@ -359,6 +336,33 @@ def _in_order(found, images):
 
 
 @njit(**_OPTIONS)
+def store(used, replicates, images, work, filled, out_keys, out_counts, out_squares):
+    """Write the ``used`` slots of one task, sorted by key, from ``filled`` on, and free them.
+
+    Returns the new end of the output, -1 where they do not fit.
+    """
+    if filled + used > out_keys.size:
+        return -1
+    found = work.keys[work.places[:used]]
+    order = _in_order(found, images)
+    for m in range(used):
+        slot = order[m]
+        total, squares = 0, 0
+        for r in range(replicates):
+            c = np.int64(work.counts[slot, r])
+            total += c
+            squares += c * c
+        if total > 0:
+            out_keys[filled] = found[slot]
+            out_counts[filled] = total
+            out_squares[filled] = squares
+            filled += 1
+    for m in range(used):
+        work.slots[work.places[m]] = -1
+    return filled
+
+
+@njit(**_OPTIONS)
 def trace_block(
     tasks, offsets, seed, quasi, points, images, scene, limit, most_rays, most_replicates,
     out_keys, out_counts, out_squares, ends, rejected,
@@ -369,7 +373,7 @@ def trace_block(
     the replicates' rays. Returns the number of tasks done; fewer than asked where the output is
     full.
     """
-    work = _room(most_rays, most_replicates)
+    work = room_for_tasks(most_rays, most_replicates)
     around = room_for_neighbours()
     filled = 0
     for k in range(tasks.shape[0]):
@@ -378,23 +382,8 @@ def trace_block(
             tasks[k, 0], tasks[k, 1], tasks[k, 2], offsets, seed, quasi, points, images, scene,
             limit, work, around,
         )  # fmt: skip
-        if filled + used > out_keys.size:
+        filled = store(used, replicates, images, work, filled, out_keys, out_counts, out_squares)
+        if filled < 0:
             return k
-        found = work.keys[work.places[:used]]
-        order = _in_order(found, images)
-        for m in range(used):
-            slot = order[m]
-            total, squares = 0, 0
-            for r in range(replicates):
-                c = np.int64(work.counts[slot, r])
-                total += c
-                squares += c * c
-            if total > 0:
-                out_keys[filled] = found[slot]
-                out_counts[filled] = total
-                out_squares[filled] = squares
-                filled += 1
-        for m in range(used):
-            work.slots[work.places[m]] = -1
         ends[k] = filled
     return tasks.shape[0]

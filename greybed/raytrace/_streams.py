@@ -59,3 +59,27 @@ def emit(state):
     py = u * (sign * b) + v * (sign + dy * dy * a) + lift * dy
     pz = u * (-sign * dx) - v * dy + lift * dz
     return dx, dy, dz, px, py, pz, state
+
+
+@njit(**_OPTIONS)
+def stream_of(sphere, seed):
+    """Stream of a sphere, from which those of its rays and replicates are made."""
+    return mix(np.uint64(seed) * MIX_1 + mix(np.uint64(sphere) + GOLDEN))
+
+
+@njit(**_OPTIONS)
+def replicate_seeds(stream, r, seeds):
+    """Seeds (4,) of the scramblings of a sphere's replicate ``r``."""
+    state = mix(stream ^ mix(np.uint64(r) + MIX_2))
+    for k in range(4):
+        state += GOLDEN
+        seeds[k] = np.uint32(mix(state) >> S32)
+
+
+@njit(**_OPTIONS)
+def draw(state, rays, k):
+    """Next ray of a stream into column ``k`` of ``rays``; returns the advanced state."""
+    dx, dy, dz, px, py, pz, state = emit(state)
+    rays[0, k], rays[1, k], rays[2, k] = dx, dy, dz
+    rays[3, k], rays[4, k], rays[5, k] = px, py, pz
+    return state

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,6 +26,7 @@ RAYS_PER_BLOCK = 1_000_000
 REPLICATES = 16
 LONGEST_REPLICATE = 16_384
 SAMPLINGS = ("sobol", "random")
+DEVICES = ("cpu", "cuda")
 # A standard error of 5e-7, and a day's work per emitter; beyond, the list of tasks alone would
 # fill the memory.
 MOST_RAYS = 10**12
@@ -94,6 +95,7 @@ def trace(
     max_distance: float = np.inf,
     sampling: str = "sobol",
     scene: Scene | None = None,
+    device: str = "cpu",
     show_progress: bool = False,
 ) -> Tally:
     """Trace ``rays`` cosine-law rays from each emitter to the first sphere or wall.
@@ -119,11 +121,14 @@ def trace(
         would exceed 16,384 rays; ``random``: every ray on its own.
     scene : Scene, optional
         That of the packing, where it is built already.
+    device : str
+        ``cpu``, or ``cuda``: rays on a GPU, see :mod:`greybed.raytrace.cuda`.
 
     Raises
     ------
     InputError
-        For numbers out of range, walls that do not repeat, or a sphere wholly inside others.
+        For numbers out of range, walls that do not repeat, a sphere wholly inside others, or a
+        device that is not there.
     """
     rays = whole_number(rays, "rays", 1, MOST_RAYS)
     seed = whole_number(seed, "seed", 0)
@@ -134,6 +139,8 @@ def trace(
         raise InputError(f"max_distance = {max_distance:g} [m] must be above 0.")
     if sampling not in SAMPLINGS:
         raise InputError(f"sampling = {sampling!r} is unknown; give one of {', '.join(SAMPLINGS)}.")
+    if device not in DEVICES:
+        raise InputError(f"device = {device!r} is unknown; give one of {', '.join(DEVICES)}.")
     n = len(packing)
     who = np.arange(n) if emitters is None else np.unique(sphere_numbers(emitters))
     if who[0] < 0 or who[-1] >= n:
@@ -142,6 +149,8 @@ def trace(
     if scene is not None and scene.packing is not packing:
         raise InputError(f"{packing.source}: the scene is that of another packing; leave it out.")
     job = _Job.of(scene or Scene.of(packing), rays, seed, sampling, images, max_distance)
+    if device == "cuda":
+        job = job.on_device()
     blocks = list(job.blocks(who))
     emitter, key, count, square = [], [], [], []
     rejected = np.zeros(n)
@@ -183,6 +192,8 @@ class _Job:
     points: NDArray[np.uint32]
     images: bool
     limit: float
+    trace_block: Callable[..., int]
+    rays_per_block: int
 
     @classmethod
     def of(
@@ -196,7 +207,17 @@ class _Job:
         points = np.zeros((_sobol.DIMENSIONS, longest), np.uint32)
         if sampling == "sobol":
             _sobol.sequence(longest, _sobol.direction_numbers(), points)
-        return cls(scene, offsets, seed, sampling == "sobol", points, images, limit)
+        return cls(
+            scene, offsets, seed, sampling == "sobol", points, images, limit,
+            _rows.trace_block, RAYS_PER_BLOCK,
+        )  # fmt: skip
+
+    def on_device(self) -> _Job:
+        """The same rays, traced by a GPU."""
+        from greybed.raytrace.cuda import Device
+
+        device = Device(self.scene.tables)
+        return replace(self, trace_block=device.trace_block, rays_per_block=device.rays_per_launch)
 
     @property
     def replicates(self) -> int:
@@ -220,7 +241,7 @@ class _Job:
         first = np.arange(0, self.replicates, self._per_task)
         last = np.append(first[1:], self.replicates)
         rays_per_task = int((self.offsets[last] - self.offsets[first]).max())
-        per_block = max(1, RAYS_PER_BLOCK // rays_per_task)
+        per_block = max(1, self.rays_per_block // rays_per_task)
         tasks = np.stack(
             [
                 np.repeat(emitters, len(first)),
@@ -250,7 +271,7 @@ class _Job:
         parts = []
         done = 0
         while done < len(tasks):
-            more = _rows.trace_block(
+            more = self.trace_block(
                 tasks[done:], self.offsets, self.seed, self.quasi, self.points, self.images,
                 self.scene.tables, self.limit, most, widest, *output, ends[done:], lost[done:],
             )  # fmt: skip

@@ -83,6 +83,7 @@ def view_factors(
     sampling: str = "sobol",
     smooth: bool = False,
     scene: Scene | None = None,
+    device: str = "cpu",
     show_progress: bool = False,
 ) -> ViewFactors:
     """Trace the view factors of a packing.
@@ -119,6 +120,9 @@ def view_factors(
         :func:`greybed.raytrace.smoothed`.
     scene : Scene, optional
         That of the packing, where it is built already: for calls with a few emitters each.
+    device : {"cpu", "cuda"}
+        Where rays are traced: on the processor, or on an NVIDIA GPU, which needs
+        ``pip install 'greybed[gpu]'``. A ray that grazes may end differently there, by rounding.
     show_progress : bool
         Draw a progress bar on standard error.
 
@@ -129,8 +133,8 @@ def view_factors(
     Raises
     ------
     InputError
-        For numbers out of range, walls that do not repeat along a periodic direction, or a
-        sphere wholly inside others.
+        For numbers out of range, walls that do not repeat along a periodic direction, a sphere
+        wholly inside others, or a device that is not there.
 
     Notes
     -----
@@ -149,6 +153,11 @@ def view_factors(
 
         if emitters is not None:
             raise InputError("rel_error refines all rows; leave out emitters, or give rays.")
+        if device != "cpu":
+            raise InputError(
+                f"rel_error measures pairs on the processor only; device = {device!r} needs rays "
+                "instead, or leave device out."
+            )
         result = refined(
             packing, rel_error, least, rays=rays, seed=seed, threads=threads,
             max_distance=max_distance, show_progress=show_progress,
@@ -163,6 +172,7 @@ def view_factors(
         max_distance=max_distance,
         sampling=sampling,
         scene=scene,
+        device=device,
         show_progress=show_progress,
     )
     if sampling == "sobol":
