@@ -16,12 +16,15 @@ from greybed.raytrace._bundle import MOST
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 # Where the rounding is covered by a margin, the order of the sums is free.
-_LOOSE = {**_OPTIONS, "fastmath": {"reassoc", "contract", "nsz", "arcp"}}
+_LOOSE = {**_OPTIONS, "fastmath": {"reassoc", "contract", "nsz", "arcp", "nnan"}}
 
 BLOCK = 16  # rays that share a list of neighbours
 GROUP = 256  # rays whose blocks choose from one first selection
 # Cosines come out wrong by less than this in single precision.
 _HAIR = np.float32(2e-6)
+# Where the rows of a block begin; unsigned, for signed indices are tested for a count from the end.
+_Y, _Z, _PX, _PY, _PZ = (np.uint64(row * BLOCK) for row in range(1, 6))
+_U1, _U2, _U3, _U4 = (np.uint64(k) for k in range(1, 5))
 _ZERO, _ONE, _INF = np.float32(0.0), np.float32(1.0), np.float32(np.inf)
 
 
@@ -31,12 +34,10 @@ class Room(NamedTuple):
     pool: np.ndarray  # (5, MOST) float32: cones of the neighbours that a group may meet
     picked: np.ndarray  # (MOST,) int32
     number: np.ndarray  # (MOST,) int32: which they are
-    list: np.ndarray  # (MOST,) int32: neighbours that a block may meet
+    list: np.ndarray  # (MOST + 1,) int32: neighbours that a block may meet
     meets: np.ndarray  # (MOST,) int32
-    best: np.ndarray  # (BLOCK,) float32: first distance
-    second: np.ndarray  # (BLOCK,) float32: second distance
-    graze: np.ndarray  # (BLOCK,) float32: how far inside the rim the first one is met
-    who: np.ndarray  # (BLOCK,) int32: the first one
+    state: np.ndarray  # (4 BLOCK,) float32, see _meet
+    spare: np.ndarray  # (4 BLOCK,) float32
 
 
 @njit(**_OPTIONS)
@@ -46,33 +47,46 @@ def room_for_blocks():
         np.empty((5, MOST), np.float32),
         np.empty(MOST, np.int32),
         np.empty(MOST, np.int32),
+        np.empty(MOST + 1, np.int32),
         np.empty(MOST, np.int32),
-        np.empty(MOST, np.int32),
-        np.empty(BLOCK, np.float32),
-        np.empty(BLOCK, np.float32),
-        np.empty(BLOCK, np.float32),
-        np.empty(BLOCK, np.int32),
+        np.empty(4 * BLOCK, np.float32),
+        np.empty(4 * BLOCK, np.float32),
     )
 
 
+@njit(**_OPTIONS)
+def in_blocks(n, columns, raw, rays):
+    """Copy ``n`` columns of ``raw`` (6, m) to ``rays``, block by block, in single precision.
+
+    A block is sixteen numbers of each row, row by row. The last one is filled with copies.
+    """
+    for base in range(0, n, BLOCK):
+        for row in range(6):
+            at = np.uint64(6 * base + row * BLOCK)
+            for k in range(BLOCK):
+                rays[at + np.uint64(k)] = raw[row, columns[min(base + k, n - 1)]]
+
+
 @njit(**_LOOSE)
-def _cone(rays, first, count):
-    """Unit axis of some directions, cosine and sine of the angle that holds them all."""
+def _cone(rays, first, last):
+    """Unit axis of the directions of some blocks, cosine and sine of the angle that holds them."""
     x, y, z = _ZERO, _ZERO, _ZERO
-    begin = np.uint64(first)
-    for k in range(np.uint64(count)):
-        x += rays[0, begin + k]
-        y += rays[1, begin + k]
-        z += rays[2, begin + k]
+    for base in range(first, last, BLOCK):
+        at = np.uint64(6 * base)
+        for k in range(np.uint64(BLOCK)):
+            x += rays[at + k]
+            y += rays[at + k + _Y]
+            z += rays[at + k + _Z]
     length = math.sqrt(x * x + y * y + z * z)
     if length < 1e-3:  # directions all round: no cone
         return _ZERO, _ZERO, _ONE, -_ONE, _ZERO
     scale = _ONE / length
     x, y, z = x * scale, y * scale, z * scale
     cosine = _ONE
-    for k in range(np.uint64(count)):
-        dot = x * rays[0, begin + k] + y * rays[1, begin + k] + z * rays[2, begin + k]
-        cosine = dot if dot < cosine else cosine
+    for base in range(first, last, BLOCK):
+        at = np.uint64(6 * base)
+        for k in range(np.uint64(BLOCK)):
+            cosine = min(cosine, x * rays[at + k] + y * rays[at + k + _Y] + z * rays[at + k + _Z])
     cosine = max(cosine - _HAIR, -_ONE)
     return x, y, z, cosine, math.sqrt(_ONE - cosine * cosine)
 
@@ -95,43 +109,60 @@ def _choose(size, cone, table, meets, out):
     return np.int64(chosen)
 
 
+@njit(inline="always", **_LOOSE)
+def _test(number, table, slack, rays, at, old, new):
+    """Test the sixteen rays from ``at`` on against one neighbour; see :func:`_meet`."""
+    p = np.uint64(8) * np.uint64(number)
+    qx, qy, qz, square = table[p], table[p + _U1], table[p + _U2], table[p + _U3]
+    name = np.float32(number)
+    for k in range(np.uint64(BLOCK)):
+        m = at + k
+        dx, dy, dz = rays[m], rays[m + _Y], rays[m + _Z]
+        ax, ay, az = qx - rays[m + _PX], qy - rays[m + _PY], qz - rays[m + _PZ]
+        b = ax * dx + ay * dy + az * dz
+        # From the distance across, not from squares of distances: that would cost digits.
+        ax, ay, az = ax - b * dx, ay - b * dy, az - b * dz
+        root = square - (ax * ax + ay * ay + az * az)
+        t = b - math.sqrt(max(root, _ZERO))
+        t = t if (root > _ZERO) & (b > -slack) else _INF
+        first, second, graze, who = old[k], old[k + _Y], old[k + _Z], old[k + _PX]
+        new[k] = min(first, t)
+        new[k + _Y] = min(second, max(first, t))
+        new[k + _Z] = root if t < first else graze
+        new[k + _PX] = name if t < first else who
+
+
 @njit(**_LOOSE)
-def _meet(list_, size, table, slack, rays, base, best, second, graze, who):
-    """First neighbour met by each of the sixteen rays from ``base`` on, and by how much."""
-    for k in range(BLOCK):
-        best[k] = _INF
-        second[k] = _INF
-        graze[k] = _ZERO
-        who[k] = -1
-    first = np.uint64(base)
+def _meet(list_, size, table, widened, slack, rays, base, state, spare):
+    """First neighbour met by each of the sixteen rays from ``base`` on; whether one is in doubt.
+
+    ``state`` gets four numbers of each ray: distances of the first and of the second one, how far
+    inside its rim the first one is met, and its number. It goes to and fro between two arrays: in
+    place, only what changes would be stored, and to wait for such stores takes longer than a test.
+    """
+    for k in range(np.uint64(BLOCK)):
+        state[k] = _INF
+        state[k + _Y] = _INF
+        state[k + _Z] = _ONE
+        state[k + _PX] = -_ONE
+    at = np.uint64(6 * base)
     far = _INF
-    for c in range(np.uint64(size)):
-        p = np.uint64(list_[c])
-        if table[4, p] >= far:
+    list_[size] = MOST  # met by none
+    for c in range(np.uint64(0), np.uint64(size), np.uint64(2)):
+        if table[np.uint64(8) * np.uint64(list_[c]) + _U4] >= far:
             break
-        qx, qy, qz, square = table[0, p], table[1, p], table[2, p], table[3, p]
-        number = np.int32(p)
-        for k in range(BLOCK):
-            m = first + np.uint64(k)
-            dx, dy, dz = rays[0, m], rays[1, m], rays[2, m]
-            ax, ay, az = qx - rays[3, m], qy - rays[4, m], qz - rays[5, m]
-            b = ax * dx + ay * dy + az * dz
-            # From the distance across, not from squares of distances: that would cost digits.
-            ax, ay, az = ax - b * dx, ay - b * dy, az - b * dz
-            root = square - (ax * ax + ay * ay + az * az)
-            t = b - math.sqrt(max(root, _ZERO))
-            t = t if (root > _ZERO) & (b > -slack) else _INF
-            nearer = t < best[k]
-            behind = best[k] if nearer else t
-            second[k] = behind if behind < second[k] else second[k]
-            graze[k] = root if nearer else graze[k]
-            who[k] = number if nearer else who[k]
-            best[k] = t if nearer else best[k]
+        _test(list_[c], table, slack, rays, at, state, spare)
+        _test(list_[c + _U1], table, slack, rays, at, spare, state)
         # Looking for the furthest costs more than a test: not after each one.
-        if (c & np.uint64(3)) == np.uint64(3):
-            far = _ZERO
-            for k in range(BLOCK):
-                far = best[k] if best[k] > far else far
+        if (c & _U2) == _U2:
+            far = state[0]
+            for k in range(np.uint64(BLOCK)):
+                far = max(far, state[k])
+    doubts = 0
+    for k in range(np.uint64(BLOCK)):
+        doubt = (state[k + _Y] < state[k] + slack) | (state[k + _Z] < widened + widened)
+        doubts += doubt | (state[k] < slack)
+    return doubts > 0
 
 
 @njit(**_OPTIONS)
@@ -167,38 +198,39 @@ def distance_of(p, around, radius, rays, k):
 def first_neighbours(n, found, around, raw, order, rays, room, distance, index):
     """First neighbour of each of ``n`` rays sorted by direction, or -1, and distance.
 
-    ``rays`` (6, m) float32 holds directions and places on the unit sphere, with room for BLOCK
-    more after the last one; ray k is ``raw[:, order[k]]`` in double precision. Distances are in
+    ``rays`` holds the columns ``order`` of ``raw`` in blocks, see :func:`in_blocks`: directions and
+    places on the unit sphere. The other arrays need room for whole blocks, too. Distances are in
     radii of the emitter, and too small by less than ``around.margins[1]``; inf for none.
     """
-    # Fill the last block with copies, so that none runs short.
-    for k in range(n, -(-n // BLOCK) * BLOCK):
-        for row in range(6):
-            rays[row, k] = rays[row, n - 1]
     table, cones, exact = around.table, around.cones, around.exact
     pool, list_, meets = room.pool, room.list, room.meets
-    picked, number = room.picked, room.number
-    best, second, graze, who = room.best, room.second, room.graze, room.who
+    picked, number, state, spare = room.picked, room.number, room.state, room.spare
     widened, slack = np.float32(around.margins[0]), np.float32(around.margins[1])
     radius = around.margins[2]
     for group in range(0, n, GROUP):
         end = min(group + GROUP, n)
-        size = _choose(found, _cone(rays, group, end - group), cones, meets, picked)
+        size = _choose(found, _cone(rays, group, end), cones, meets, picked)
         for c in range(size):
             p = picked[c]
             number[c] = p
             for row in range(5):
                 pool[row, c] = cones[row, p]
         for base in range(group, end, BLOCK):
-            chosen = _choose(size, _cone(rays, base, BLOCK), pool, meets, list_)
+            chosen = _choose(size, _cone(rays, base, base + BLOCK), pool, meets, list_)
             for c in range(chosen):
                 list_[c] = number[list_[c]]
-            _meet(list_, chosen, table, slack, rays, base, best, second, graze, who)
+            doubts = _meet(list_, chosen, table, widened, slack, rays, base, state, spare)
+            for k in range(BLOCK):
+                distance[base + k] = state[k]
+                index[base + k] = np.int32(state[k + 3 * BLOCK])
+            if not doubts:
+                continue
             for k in range(min(BLOCK, n - base)):
-                distance[base + k] = best[k]
-                index[base + k] = who[k]
-                if best[k] < _INF and (
-                    second[k] < best[k] + slack or graze[k] < 2 * widened or best[k] < slack
+                best = state[k]
+                if best < _INF and (
+                    state[k + BLOCK] < best + slack
+                    or state[k + 2 * BLOCK] < widened + widened
+                    or best < slack
                 ):
                     p, t = _met_exactly(list_, chosen, exact, radius, raw, order[base + k])
                     distance[base + k] = t / radius

@@ -64,7 +64,7 @@ class Around(NamedTuple):
     """Room for the neighbours of one sphere, nearest first."""
 
     exact: np.ndarray  # (4, MOST): vector [m], radius^2 [m2]
-    table: np.ndarray  # (5, MOST) float32: the same in radii of the sphere, widened, and nearest t
+    table: np.ndarray  # (8 MOST + 8,) float32: the same in radii of the sphere, widened; nearest t
     cones: np.ndarray  # (5, MOST) float32: unit vector, cosine and sine of half the shadow
     margins: np.ndarray  # (3,): widening of radius^2 and error of t, in radii; radius [m]
     sphere: np.ndarray  # (MOST,) int64
@@ -79,7 +79,7 @@ def room_for_neighbours():
     """Empty room, made once a block of work."""
     return Around(
         np.empty((4, MOST)),
-        np.empty((5, MOST), np.float32),
+        np.full(8 * MOST + 8, -np.inf, np.float32),
         np.empty((5, MOST), np.float32),
         np.empty(3),
         np.empty(MOST, np.int64),
@@ -182,12 +182,12 @@ def _by_shell(found, own, ball, largest, around):
         r, distance = raw[3, k], max(raw[4, k], 1e-300)
         for axis in range(3):
             exact[axis, p] = raw[axis, k]
-            table[axis, p] = raw[axis, k] * scale
+            table[8 * p + axis] = raw[axis, k] * scale
             cones[axis, p] = raw[axis, k] / distance
         exact[3, p] = r * r
-        table[3, p] = (r * scale) ** 2 + widened
+        table[8 * p + 3] = (r * scale) ** 2 + widened
         # A ray starts one radius out. With the error of t taken off, what follows matters no more.
-        table[4, p] = at * ball / SHELLS * scale - 1.0 - 2.0 * slack
+        table[8 * p + 4] = at * ball / SHELLS * scale - 1.0 - 2.0 * slack
         sine = min((own + r) / distance, 1.0)
         cones[3, p], cones[4, p] = math.sqrt(1.0 - sine * sine), sine
         around.sphere[p] = shell[1, k]

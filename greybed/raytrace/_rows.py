@@ -11,6 +11,7 @@ from greybed.raytrace._blocks import (
     Room,
     distance_of,
     first_neighbours,
+    in_blocks,
     room_for_blocks,
 )
 from greybed.raytrace._bundle import (
@@ -187,13 +188,11 @@ def trace_sphere(
         return 0, -1
     ball = radius + scene.places.reach
     found = gather(sphere, scene.centres, scene.radii, scene.places, ball, around)
-    raw, rays, order = work.raw, work.rays, work.order
+    raw, rays, order, waiting = work.raw, work.rays, work.order, work.waiting
     single = work.single
     if found >= 0:
         sort_by_direction(n, raw, work.code, work.fields, order)
-        for row in range(6):
-            for k in range(n):
-                single[row, k] = raw[row, order[k]]
+        in_blocks(n, order, raw, single)
     else:
         ball = 0.0
         for k in range(n):
@@ -228,12 +227,19 @@ def trace_sphere(
     # Most rays end at a neighbour before anything else could matter; the others wait.
     pending, ahead, bound, wall = work.pending, work.ahead, work.bound, work.wall
     safe = np.float32(min(min(ball, clear) - radius, limit) / radius - around.margins[1])
-    m = 0
-    for k in range(n):
-        hit = -1 if found < 0 else np.int64(index[k])
-        if hit >= 0 and reach[k] < safe:
-            counts[slot_of[hit], part[order[k]]] += 1
-            continue
+    m = n
+    if found >= 0:
+        m = 0
+        slot_of[0] = slot_of[0] if found > 0 else 0
+        for k in range(n):
+            # No branch: the processor would guess wrong too often. Rays that meet none count 0.
+            settled = reach[k] < safe
+            counts[slot_of[max(index[k], 0)], part[order[k]]] += settled
+            waiting[m] = k
+            m += not settled
+    for q in range(m):
+        k = waiting[q] if found >= 0 else q
+        hit = np.int64(index[k]) if found >= 0 else -1
         column = order[k]
         dx, dy, dz = raw[0, column], raw[1, column], raw[2, column]
         px, py, pz = raw[3, column] * radius, raw[4, column] * radius, raw[5, column] * radius
@@ -245,12 +251,11 @@ def trace_sphere(
             if hit >= 0:
                 distance = distance_of(hit, around, radius, raw, column)
                 hit = -1 if distance > begin else hit
-        rays[0, m], rays[1, m], rays[2, m] = dx, dy, dz
-        rays[3, m], rays[4, m], rays[5, m] = px, py, pz
+        rays[0, q], rays[1, q], rays[2, q] = dx, dy, dz
+        rays[3, q], rays[4, q], rays[5, q] = px, py, pz
         # What is known already needs no march, only a look at the walls and the limit.
-        hits[m], met[m], ahead[m] = hit, distance, begin if hit < 0 else np.inf
-        pending[m], bound[m], wall[m] = column, limit, -1
-        m += 1
+        hits[q], met[q], ahead[q] = hit, distance, begin if hit < 0 else np.inf
+        pending[q], bound[q], wall[q] = column, limit, -1
     if clear < np.inf:
         walls_ahead(m, rays, scene.centres[sphere], scene.walls, bound, wall)
     frame, start, items, owner, image = scene.grid
@@ -280,14 +285,15 @@ class Work(NamedTuple):
     """Scratch of one thread, for tasks of up to so many rays and replicates."""
 
     raw: np.ndarray  # (6, rays): direction, place on the unit sphere
-    single: np.ndarray  # (6, rays) float32: the same by direction
+    single: np.ndarray  # (6 rays,) float32: the same by direction, in blocks
     rays: np.ndarray  # (6, rays): those that no neighbour has settled, places in metres
     order: np.ndarray  # (rays,) int64
     code: np.ndarray  # (rays,) int64
     fields: np.ndarray  # (4097,) int64
     distance: np.ndarray  # (rays,) float32, in radii
     nearest: np.ndarray  # (rays,) int32, neighbour
-    pending: np.ndarray  # (rays,) int64, columns of the rays that no neighbour has settled
+    waiting: np.ndarray  # (rays,) int64, rays that no neighbour has settled
+    pending: np.ndarray  # (rays,) int64, their columns
     hit: np.ndarray  # (rays,) int64, their neighbour or -1
     met: np.ndarray  # (rays,) its distance [m]
     ahead: np.ndarray  # (rays,) how far they have come [m]
@@ -312,13 +318,14 @@ def _room(rays, replicates):
     padded = rays + BLOCK
     return Work(
         np.empty((6, padded)),
-        np.empty((6, padded), np.float32),
+        np.empty(6 * padded, np.float32),
         np.empty((6, padded)),
         np.empty(padded, np.int64),
         np.empty(padded, np.int64),
         np.empty(4097, np.int64),
         np.empty(padded, np.float32),
         np.empty(padded, np.int32),
+        np.empty(padded, np.int64),
         np.empty(padded, np.int64),
         np.empty(padded, np.int64),
         np.empty(padded),
