@@ -199,26 +199,30 @@ def _by_shell(found, own, ball, largest, around):
             around.image[axis, k] = shell[3, k]
 
 
-@njit(**_OPTIONS)
-def _interleaved(x, y):
-    """Bits of two numbers below 256 in turn: neighbours in the plane stay close in the order."""
-    x = (x | (x << 4)) & 0x0F0F
-    x = (x | (x << 2)) & 0x3333
-    x = (x | (x << 1)) & 0x5555
-    y = (y | (y << 4)) & 0x0F0F
-    y = (y | (y << 2)) & 0x3333
-    y = (y | (y << 1)) & 0x5555
-    return x | (y << 1)
+def _hilbert(side: int) -> np.ndarray:
+    """Place of each field of a square on Hilbert's curve, (side^2,) int16: it never jumps."""
+    order = np.zeros((1, 1), np.int64)
+    while len(order) < side:
+        quarter = order.size
+        flipped = order[::-1, ::-1].T
+        low = np.hstack([order.T, order + quarter])
+        order = np.vstack([low, np.hstack([flipped + 3 * quarter, order + 2 * quarter])])
+    return order.ravel().astype(np.int16)
+
+
+_SIDE = 64
+_CURVE = _hilbert(_SIDE)
 
 
 @njit(**_OPTIONS)
 def sort_by_direction(n, rays, code, count, order):
     """Numbers of the first ``n`` rays by place of their direction on an octahedron, unfolded."""
     # About four rays a field: finer fields scatter the memory, coarser ones widen the cones.
-    half = 4
-    while half < 32 and 16 * half * half < n:
-        half *= 2
-    fields = 4 * half * half
+    shift = 6
+    while shift > 0 and (_SIDE * _SIDE >> shift) * 4 < n:
+        shift -= 2
+    fields = _SIDE * _SIDE >> shift
+    half = _SIDE // 2
     for f in range(fields + 1):
         count[f] = 0
     for k in range(n):
@@ -232,7 +236,7 @@ def sort_by_direction(n, rays, code, count, order):
             )
         iu = min(np.int64((u + 1.0) * half), 2 * half - 1)
         iv = min(np.int64((v + 1.0) * half), 2 * half - 1)
-        code[k] = _interleaved(iu, iv)
+        code[k] = _CURVE[_SIDE * iu + iv] >> shift
     for k in range(n):
         count[code[k] + 1] += 1
     for f in range(fields):
