@@ -287,12 +287,12 @@ class Work(NamedTuple):
     raw: np.ndarray  # (6, rays): direction, place on the unit sphere
     single: np.ndarray  # (6 rays,) float32: the same by direction, in blocks
     rays: np.ndarray  # (6, rays): those that no neighbour has settled, places in metres
-    order: np.ndarray  # (rays,) int64
-    code: np.ndarray  # (rays,) int64
+    order: np.ndarray  # (rays,) int32
+    code: np.ndarray  # (rays,) int16
     fields: np.ndarray  # (4097,) int64
     distance: np.ndarray  # (rays,) float32, in radii
     nearest: np.ndarray  # (rays,) int32, neighbour
-    waiting: np.ndarray  # (rays,) int64, rays that no neighbour has settled
+    waiting: np.ndarray  # (rays,) int32, rays that no neighbour has settled
     pending: np.ndarray  # (rays,) int64, their columns
     hit: np.ndarray  # (rays,) int64, their neighbour or -1
     met: np.ndarray  # (rays,) its distance [m]
@@ -320,12 +320,12 @@ def _room(rays, replicates):
         np.empty((6, padded)),
         np.empty(6 * padded, np.float32),
         np.empty((6, padded)),
-        np.empty(padded, np.int64),
-        np.empty(padded, np.int64),
+        np.empty(padded, np.int32),
+        np.empty(padded, np.int16),
         np.empty(4097, np.int64),
         np.empty(padded, np.float32),
         np.empty(padded, np.int32),
-        np.empty(padded, np.int64),
+        np.empty(padded, np.int32),
         np.empty(padded, np.int64),
         np.empty(padded, np.int64),
         np.empty(padded),
