@@ -55,16 +55,23 @@ def room_for_blocks():
 
 
 @njit(**_OPTIONS)
-def in_blocks(n, columns, raw, rays):
-    """Copy ``n`` columns of ``raw`` (6, m) to ``rays``, block by block, in single precision.
+def in_blocks(n, order, raw, row, rays):
+    """Copy columns ``order`` of ``raw`` (6, m) to ``rays``, block by block, in single precision.
 
-    A block is sixteen numbers of each row, row by row. The last one is filled with copies.
+    A block is sixteen numbers of each row, row by row. The last one is filled with copies. ``row``
+    (n,) float32 is scratch: one row at a time stays in the nearest cache while it is permuted.
     """
-    for base in range(0, n, BLOCK):
-        for row in range(6):
-            at = np.uint64(6 * base + row * BLOCK)
-            for k in range(BLOCK):
-                rays[at + np.uint64(k)] = raw[row, columns[min(base + k, n - 1)]]
+    whole = n // BLOCK * BLOCK
+    for axis in range(6):
+        for k in range(n):
+            row[k] = raw[axis, k]
+        at = np.uint64(axis * BLOCK)
+        for base in range(np.uint64(0), np.uint64(whole), np.uint64(BLOCK)):
+            for k in range(np.uint64(BLOCK)):
+                rays[at + k] = row[np.uint64(order[base + k])]
+            at += np.uint64(6 * BLOCK)
+        for k in range(BLOCK if whole < n else 0):
+            rays[at + np.uint64(k)] = row[order[min(whole + k, n - 1)]]
 
 
 @njit(**_LOOSE)

@@ -223,25 +223,24 @@ def sort_by_direction(n, rays, code, count, order):
         shift -= 2
     fields = _SIDE * _SIDE >> shift
     half = _SIDE // 2
-    for f in range(fields + 1):
+    for f in range(np.uint64(fields + 1)):
         count[f] = 0
-    for k in range(n):
+    for k in range(np.uint64(n)):
         dx, dy, dz = rays[0, k], rays[1, k], rays[2, k]
         scale = 1.0 / (abs(dx) + abs(dy) + abs(dz))
         u, v = dx * scale, dy * scale
-        if dz < 0.0:
-            u, v = (
-                math.copysign(1.0 - abs(v), u),
-                math.copysign(1.0 - abs(u), v),
-            )
-        iu = min(np.int64((u + 1.0) * half), 2 * half - 1)
-        iv = min(np.int64((v + 1.0) * half), 2 * half - 1)
-        code[k] = _CURVE[_SIDE * iu + iv] >> shift
-    for k in range(n):
-        count[code[k] + 1] += 1
-    for f in range(fields):
-        count[f + 1] += count[f]
-    for k in range(n):
-        p = count[code[k]]
-        count[code[k]] = p + 1
-        order[p] = k
+        fold_u, fold_v = math.copysign(1.0 - abs(v), u), math.copysign(1.0 - abs(u), v)
+        u, v = (u if dz >= 0.0 else fold_u), (v if dz >= 0.0 else fold_v)
+        iu = min(np.int32((u + 1.0) * half), np.int32(_SIDE - 1))
+        iv = min(np.int32((v + 1.0) * half), np.int32(_SIDE - 1))
+        # Unsigned indices: signed ones are tested for a count from the end.
+        code[k] = _CURVE[np.uint64(_SIDE * iu + iv)] >> shift
+    for k in range(np.uint64(n)):
+        count[np.uint64(code[k]) + np.uint64(1)] += 1
+    for f in range(np.uint64(fields)):
+        count[f + np.uint64(1)] += count[f]
+    for k in range(np.uint64(n)):
+        field = np.uint64(code[k])
+        p = count[field]
+        count[field] = p + 1
+        order[np.uint64(p)] = k

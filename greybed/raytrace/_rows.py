@@ -192,7 +192,7 @@ def trace_sphere(
     single = work.single
     if found >= 0:
         sort_by_direction(n, raw, work.code, work.fields, order)
-        in_blocks(n, order, raw, single)
+        in_blocks(n, order, raw, work.distance, single)
     else:
         ball = 0.0
         for k in range(n):
