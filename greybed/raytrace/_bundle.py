@@ -136,7 +136,8 @@ def gather(i, centres, radii, places, ball, around):
                     square = x * x + y * y + z * z
                     if square >= (ball + r) ** 2 or (j == i and wx == 0 and wy == 0 and wz == 0):
                         continue
-                    if found == MOST:
+                    # One slot of the tallies is left for the rays that escape.
+                    if found == MOST - 1:
                         return -1
                     distance = math.sqrt(square)
                     near = max(distance - r, 0.0)

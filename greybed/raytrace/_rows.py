@@ -134,6 +134,16 @@ class Tables(NamedTuple):
 
 
 @njit(**_OPTIONS)
+def _outside(x, y, z, frame):
+    """Whether a place on a ray lies out of the bed: there is no way back, for a bed is convex."""
+    low, edge, periodic = frame.low, frame.edge, frame.periodic
+    out_x = ((x < low[0]) | (x > low[0] + edge[0])) & (not periodic[0])
+    out_y = ((y < low[1]) | (y > low[1] + edge[1])) & (not periodic[1])
+    out_z = ((z < low[2]) | (z > low[2] + edge[2])) & (not periodic[2])
+    return out_x | out_y | out_z
+
+
+@njit(**_OPTIONS)
 def _march_on(
     m, rays, ahead, bound, centre, images, frame, start, items, owner, image, key
 ):
@@ -151,12 +161,8 @@ def _march_on(
         x, sx = wrapped(centre[0] + rays[3, q] + ahead[q] * dx, low[0], edge[0], periodic[0])
         y, sy = wrapped(centre[1] + rays[4, q] + ahead[q] * dy, low[1], edge[1], periodic[1])
         z, sz = wrapped(centre[2] + rays[5, q] + ahead[q] * dz, low[2], edge[2], periodic[2])
-        if ahead[q] > 0.0 and (
-            x < low[0] or x > low[0] + edge[0]
-            or y < low[1] or y > low[1] + edge[1]
-            or z < low[2] or z > low[2] + edge[2]
-        ):  # fmt: skip
-            continue  # out of the bed, and no way back
+        if ahead[q] > 0.0 and _outside(x, y, z, frame):
+            continue
         _, item, mx, my, mz = march(x, y, z, dx, dy, dz, bound[q] - ahead[q], frame, start, items)
         if item >= 0:
             key[q] = _key(
@@ -179,6 +185,7 @@ def trace_sphere(
     numbers alone, so neither the order nor the thread of the work changes a bit of the result.
     """
     radius, clear = scene.radii[sphere], scene.clearance[sphere]
+    cx, cy, cz = scene.centres[sphere, 0], scene.centres[sphere, 1], scene.centres[sphere, 2]
     n = offsets[last] - offsets[first]
     hidden = not scene.exposed[sphere]
     rejected = _start_rays(
@@ -224,20 +231,29 @@ def trace_sphere(
                 counts[used, r] = 0
             used += 1
         slot_of[p] = slot
+    # Rays that escape are many in sparse beds: a slot of their own, which takes no search.
+    lost, place = _slot(np.int64(ESCAPED), keys, slots, used, mask)
+    places[used] = place
+    for r in range(replicates):
+        counts[used, r] = 0
+    used += 1
     # Most rays end at a neighbour before anything else could matter; the others wait.
     pending, ahead, bound, wall = work.pending, work.ahead, work.bound, work.wall
     safe = np.float32(min(min(ball, clear) - radius, limit) / radius - around.margins[1])
-    m = n
+    waits = n
     if found >= 0:
-        m = 0
+        waits = 0
         slot_of[0] = slot_of[0] if found > 0 else 0
-        for k in range(n):
+        for k in range(np.uint64(n)):
             # No branch: the processor would guess wrong too often. Rays that meet none count 0.
             settled = reach[k] < safe
-            counts[slot_of[max(index[k], 0)], part[order[k]]] += settled
-            waiting[m] = k
-            m += not settled
-    for q in range(m):
+            slot = slot_of[np.uint64(max(index[k], 0))]
+            counts[np.uint64(slot), np.uint64(part[np.uint64(order[k])])] += settled
+            waiting[np.uint64(waits)] = k
+            waits += not settled
+    frame, start, items, owner, image = scene.grid
+    m = 0
+    for q in range(waits):
         k = waiting[q] if found >= 0 else q
         hit = np.int64(index[k]) if found >= 0 else -1
         column = order[k]
@@ -251,14 +267,18 @@ def trace_sphere(
             if hit >= 0:
                 distance = distance_of(hit, around, radius, raw, column)
                 hit = -1 if distance > begin else hit
-        rays[0, q], rays[1, q], rays[2, q] = dx, dy, dz
-        rays[3, q], rays[4, q], rays[5, q] = px, py, pz
+        if hit < 0 and begin < limit and clear == np.inf:
+            if _outside(cx + px + begin * dx, cy + py + begin * dy, cz + pz + begin * dz, frame):
+                counts[lost, part[column]] += 1
+                continue
+        rays[0, m], rays[1, m], rays[2, m] = dx, dy, dz
+        rays[3, m], rays[4, m], rays[5, m] = px, py, pz
         # What is known already needs no march, only a look at the walls and the limit.
-        hits[q], met[q], ahead[q] = hit, distance, begin if hit < 0 else np.inf
-        pending[q], bound[q], wall[q] = column, limit, -1
+        hits[m], met[m], ahead[m] = hit, distance, begin if hit < 0 else np.inf
+        pending[m], bound[m], wall[m] = column, limit, -1
+        m += 1
     if clear < np.inf:
         walls_ahead(m, rays, scene.centres[sphere], scene.walls, bound, wall)
-    frame, start, items, owner, image = scene.grid
     _march_on(
         m, rays, ahead, bound, scene.centres[sphere], images, frame, start, items, owner,
         image, key_of,
@@ -271,6 +291,9 @@ def trace_sphere(
             continue
         if key == ESCAPED and wall[q] >= 0:
             key = np.int64(-1 - wall[q])
+        if key == ESCAPED:
+            counts[lost, replicate] += 1
+            continue
         slot, place = _slot(key, keys, slots, used, mask)
         if slot == used:
             places[used] = place
