@@ -77,9 +77,11 @@ class Around(NamedTuple):
 @njit(**_OPTIONS)
 def room_for_neighbours():
     """Empty room, made once a block of work."""
+    table = np.zeros(8 * MOST + 8, np.float32)
+    table[8 * MOST + 3] = -1.0  # what follows the last one is met by no ray
     return Around(
         np.empty((4, MOST)),
-        np.full(8 * MOST + 8, -np.inf, np.float32),
+        table,
         np.empty((5, MOST), np.float32),
         np.empty(3),
         np.empty(MOST, np.int64),
