@@ -144,9 +144,7 @@ def _outside(x, y, z, frame):
 
 
 @njit(**_OPTIONS)
-def _march_on(
-    m, rays, ahead, bound, centre, images, frame, start, items, owner, image, key
-):
+def _march_on(m, rays, ahead, bound, centre, images, frame, start, items, owner, image, key):
     """Keys of what ``m`` pending rays meet that have come ``ahead`` [m] freely.
 
     One loop over all of them: arrays handed to a function for every ray would be reference-counted
@@ -267,10 +265,11 @@ def trace_sphere(
             if hit >= 0:
                 distance = distance_of(hit, around, radius, raw, column)
                 hit = -1 if distance > begin else hit
-        if hit < 0 and begin < limit and clear == np.inf:
-            if _outside(cx + px + begin * dx, cy + py + begin * dy, cz + pz + begin * dz, frame):
-                counts[lost, part[column]] += 1
-                continue
+        at_x, at_y, at_z = cx + px + begin * dx, cy + py + begin * dy, cz + pz + begin * dz
+        free = hit < 0 and begin < limit and clear == np.inf
+        if free and begin > 0.0 and _outside(at_x, at_y, at_z, frame):
+            counts[lost, part[column]] += 1
+            continue
         rays[0, m], rays[1, m], rays[2, m] = dx, dy, dz
         rays[3, m], rays[4, m], rays[5, m] = px, py, pz
         # What is known already needs no march, only a look at the walls and the limit.
