@@ -1,9 +1,9 @@
-"""Compiled bundles: all rays of one sphere traced together against the spheres around it.
+"""Compiled bundles: the neighbours of one sphere, and its rays in the order of their directions.
 
 Rays of one sphere meet the same few neighbours again and again. So they are sorted by direction,
 and each block of sixteen takes along only the neighbours inside its cone, nearest first: the inner
-loop then runs over rays, without branches, and fills the vector registers. A ray that leaves the
-ball of the neighbours goes on alone through the cell grid.
+loop then runs over rays, without branches, and fills the vector registers (see _blocks). A ray that
+leaves the ball of the neighbours goes on alone through the cell grid.
 """
 
 import math
@@ -14,8 +14,6 @@ from numba import njit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
-BLOCK = 16  # rays that share a list of neighbours
-GROUP = 256  # rays whose blocks choose from one first selection
 MOST = 1024  # neighbours of one sphere; where there are more, its rays go through the grid alone
 CROWD = 48.0  # neighbours a block may expect; beyond, the grid is faster
 SHELLS = 64  # shells by which neighbours are sorted
@@ -65,21 +63,27 @@ def sort_places(
 class Around(NamedTuple):
     """Room for the neighbours of one sphere, nearest first."""
 
-    table: np.ndarray  # (9, MOST): vector, radius^2, unit vector, cosine and sine of half shadow
-    near: np.ndarray  # (MOST,): no point of it and of what follows lies nearer to the centre [m]
+    exact: np.ndarray  # (4, MOST): vector [m], radius^2 [m2]
+    table: np.ndarray  # (8 MOST + 8,) float32: the same in radii of the sphere, widened; nearest t
+    cones: np.ndarray  # (5, MOST) float32: unit vector, cosine and sine of half the shadow
+    margins: np.ndarray  # (3,): widening of radius^2 and error of t, in radii; radius [m]
     sphere: np.ndarray  # (MOST,) int64
     image: np.ndarray  # (3, MOST) int64, in boxes
     raw: np.ndarray  # (5, MOST): vector, radius, distance of the nearest point
-    shell: np.ndarray  # (2, MOST) int64
+    shell: np.ndarray  # (4, MOST) int64
     ends: np.ndarray  # (SHELLS + 1,) int64
 
 
 @njit(**_OPTIONS)
 def room_for_neighbours():
     """Empty room, made once a block of work."""
+    table = np.zeros(8 * MOST + 8, np.float32)
+    table[8 * MOST + 3] = -1.0  # what follows the last one is met by no ray
     return Around(
-        np.empty((9, MOST)),
-        np.empty(MOST),
+        np.empty((4, MOST)),
+        table,
+        np.empty((5, MOST), np.float32),
+        np.empty(3),
         np.empty(MOST, np.int64),
         np.empty((3, MOST), np.int64),
         np.empty((5, MOST)),
@@ -134,7 +138,8 @@ def gather(i, centres, radii, places, ball, around):
                     square = x * x + y * y + z * z
                     if square >= (ball + r) ** 2 or (j == i and wx == 0 and wy == 0 and wz == 0):
                         continue
-                    if found == MOST:
+                    # One slot of the tallies is left for the rays that escape.
+                    if found == MOST - 1:
                         return -1
                     distance = math.sqrt(square)
                     near = max(distance - r, 0.0)
@@ -153,16 +158,25 @@ def gather(i, centres, radii, places, ball, around):
                     found += 1
     if crowd > CROWD:
         return -1
-    _by_shell(found, own, ball, around)
+    _by_shell(found, own, ball, places.largest, around)
     return found
 
 
 @njit(**_OPTIONS)
-def _by_shell(found, own, ball, around):
+def _by_shell(found, own, ball, largest, around):
     """Bring the neighbours found into the order of their shells, ready for the blocks."""
-    raw, shell, ends, table = around.raw, around.shell, around.ends, around.table
+    raw, shell, ends = around.raw, around.shell, around.ends
+    exact, table, cones = around.exact, around.table, around.cones
+    # All vectors are shorter than this many radii, and single precision rounds by up to 2^-24 of
+    # them: b, along the ray, is off by 6 such, radius^2 less the distance across squared by 25 at
+    # the rim. Half the widening covers that with room to spare, and t is off by its root at most.
+    span, widest = (ball + largest) / own + 1.0, largest / own
+    widened = 5e-6 * span * (widest + 1e-6 * span)
+    slack = 0.8 * math.sqrt(widened) + 2e-6 * span
+    around.margins[0], around.margins[1], around.margins[2] = widened, slack, own
     for s in range(SHELLS):
         ends[s + 1] += ends[s]
+    scale = 1.0 / own
     for k in range(found):
         at = shell[0, k]
         p = ends[at]
@@ -170,12 +184,15 @@ def _by_shell(found, own, ball, around):
         shell[2, k] = p
         r, distance = raw[3, k], max(raw[4, k], 1e-300)
         for axis in range(3):
-            table[axis, p] = raw[axis, k]
-            table[4 + axis, p] = raw[axis, k] / distance
-        table[3, p] = r * r
+            exact[axis, p] = raw[axis, k]
+            table[8 * p + axis] = raw[axis, k] * scale
+            cones[axis, p] = raw[axis, k] / distance
+        exact[3, p] = r * r
+        table[8 * p + 3] = (r * scale) ** 2 + widened
+        # A ray starts one radius out. With the error of t taken off, what follows matters no more.
+        table[8 * p + 4] = at * ball / SHELLS * scale - 1.0 - 2.0 * slack
         sine = min((own + r) / distance, 1.0)
-        table[7, p], table[8, p] = math.sqrt(1.0 - sine * sine), sine
-        around.near[p] = at * ball / SHELLS
+        cones[3, p], cones[4, p] = math.sqrt(1.0 - sine * sine), sine
         around.sphere[p] = shell[1, k]
     # The images go the same way, through the room of the shells that is free by now.
     for axis in range(3):
@@ -185,136 +202,48 @@ def _by_shell(found, own, ball, around):
             around.image[axis, k] = shell[3, k]
 
 
-@njit(**_OPTIONS)
-def _interleaved(x, y):
-    """Bits of two numbers below 256 in turn: neighbours in the plane stay close in the order."""
-    x = (x | (x << 4)) & 0x0F0F
-    x = (x | (x << 2)) & 0x3333
-    x = (x | (x << 1)) & 0x5555
-    y = (y | (y << 4)) & 0x0F0F
-    y = (y | (y << 2)) & 0x3333
-    y = (y | (y << 1)) & 0x5555
-    return x | (y << 1)
+def _hilbert(side: int) -> np.ndarray:
+    """Place of each field of a square on Hilbert's curve, (side^2,) int16: it never jumps."""
+    order = np.zeros((1, 1), np.int64)
+    while len(order) < side:
+        quarter = order.size
+        flipped = order[::-1, ::-1].T
+        low = np.hstack([order.T, order + quarter])
+        order = np.vstack([low, np.hstack([flipped + 3 * quarter, order + 2 * quarter])])
+    return order.ravel().astype(np.int16)
+
+
+_SIDE = 64
+_CURVE = _hilbert(_SIDE)
 
 
 @njit(**_OPTIONS)
 def sort_by_direction(n, rays, code, count, order):
     """Numbers of the first ``n`` rays by place of their direction on an octahedron, unfolded."""
     # About four rays a field: finer fields scatter the memory, coarser ones widen the cones.
-    half = 4
-    while half < 32 and 16 * half * half < n:
-        half *= 2
-    fields = 4 * half * half
-    for f in range(fields + 1):
+    shift = 6
+    while shift > 0 and (_SIDE * _SIDE >> shift) * 4 < n:
+        shift -= 2
+    fields = _SIDE * _SIDE >> shift
+    half = _SIDE // 2
+    for f in range(np.uint64(fields + 1)):
         count[f] = 0
-    for k in range(n):
+    for k in range(np.uint64(n)):
         dx, dy, dz = rays[0, k], rays[1, k], rays[2, k]
         scale = 1.0 / (abs(dx) + abs(dy) + abs(dz))
         u, v = dx * scale, dy * scale
-        if dz < 0.0:
-            u, v = (
-                math.copysign(1.0 - abs(v), u),
-                math.copysign(1.0 - abs(u), v),
-            )
-        iu = min(np.int64((u + 1.0) * half), 2 * half - 1)
-        iv = min(np.int64((v + 1.0) * half), 2 * half - 1)
-        code[k] = _interleaved(iu, iv)
-    for k in range(n):
-        count[code[k] + 1] += 1
-    for f in range(fields):
-        count[f + 1] += count[f]
-    for k in range(n):
-        p = count[code[k]]
-        count[code[k]] = p + 1
-        order[p] = k
-
-
-@njit(**_OPTIONS)
-def _cone(rays, first, last):
-    """Unit axis of some directions, cosine and sine of the angle that holds them all."""
-    x, y, z = 0.0, 0.0, 0.0
-    for k in range(first, last):
-        x += rays[0, k]
-        y += rays[1, k]
-        z += rays[2, k]
-    length = math.sqrt(x * x + y * y + z * z)
-    if length < 1e-3:  # directions all round: no cone
-        return 0.0, 0.0, 1.0, -1.0, 0.0
-    x, y, z = x / length, y / length, z / length
-    cosine = 1.0
-    for k in range(first, last):
-        cosine = min(cosine, x * rays[0, k] + y * rays[1, k] + z * rays[2, k])
-    # A hair wider, against rounding.
-    cosine = max(cosine - 1e-12, -1.0)
-    return x, y, z, cosine, math.sqrt(1.0 - cosine * cosine)
-
-
-@njit(**_OPTIONS)
-def _choose(pool, size, all_of_them, cone, table, out):
-    """Neighbours whose shadow the cone meets: of the pool, or of the first ``size``."""
-    x, y, z, cosine, sine = cone
-    if cosine <= 0.0:  # so wide that half angles may add up to more than a straight angle
-        for k in range(size):
-            out[k] = k if all_of_them else pool[k]
-        return size
-    chosen = 0
-    for k in range(size):
-        p = k if all_of_them else pool[k]
-        dot = x * table[4, p] + y * table[5, p] + z * table[6, p]
-        out[chosen] = p
-        chosen += dot >= table[7, p] * cosine - table[8, p] * sine
-    return chosen
-
-
-@njit(**_OPTIONS)
-def _meet(list_, size, table, near, own, rays, base, best, who):
-    """First neighbour met by each of the sixteen rays from ``base`` on."""
-    for k in range(BLOCK):
-        best[k] = np.inf
-        who[k] = -1
-    first = np.uint64(base)
-    far = np.inf
-    for c in range(size):
-        p = list_[c]
-        if near[p] - own >= far:
-            break
-        qx, qy, qz, square = table[0, p], table[1, p], table[2, p], table[3, p]
-        for k in range(BLOCK):
-            m = first + np.uint64(k)
-            ax, ay, az = qx - rays[3, m], qy - rays[4, m], qz - rays[5, m]
-            b = ax * rays[0, m] + ay * rays[1, m] + az * rays[2, m]
-            root = b * b - (ax * ax + ay * ay + az * az) + square
-            t = b - math.sqrt(max(root, 0.0))
-            meets = (root > 0.0) & (b > 0.0) & (t < best[k])
-            best[k] = t if meets else best[k]
-            who[k] = p if meets else who[k]
-        # Looking for the furthest costs more than a test: not after each one.
-        if (c & 3) == 3:
-            far = 0.0
-            for k in range(BLOCK):
-                far = max(far, best[k])
-
-
-@njit(**_OPTIONS)
-def first_neighbours(n, own, found, around, rays, distance, index, room, best, who):
-    """First neighbour of each of ``n`` rays sorted by direction: distance and number, or -1.
-
-    ``rays`` (6, m) holds directions and places relative to the centre [m], with room for BLOCK
-    more after the last one; ``room`` (2, MOST) int64, ``best`` and ``who`` (BLOCK,) are scratch.
-    """
-    # Fill the last block with copies, so that none runs short.
-    for k in range(n, -(-n // BLOCK) * BLOCK):
-        for row in range(6):
-            rays[row, k] = rays[row, n - 1]
-    table = around.table
-    for group in range(0, n, GROUP):
-        end = min(group + GROUP, n)
-        cone = _cone(rays, group, end)
-        pool = _choose(room[0], found, True, cone, table, room[0])
-        for base in range(group, end, BLOCK):
-            cone = _cone(rays, base, base + BLOCK)
-            size = _choose(room[0], pool, False, cone, table, room[1])
-            _meet(room[1], size, table, around.near, own, rays, base, best, who)
-            for k in range(min(BLOCK, n - base)):
-                distance[base + k] = best[k]
-                index[base + k] = who[k]
+        fold_u, fold_v = math.copysign(1.0 - abs(v), u), math.copysign(1.0 - abs(u), v)
+        u, v = (u if dz >= 0.0 else fold_u), (v if dz >= 0.0 else fold_v)
+        iu = min(np.int32((u + 1.0) * half), np.int32(_SIDE - 1))
+        iv = min(np.int32((v + 1.0) * half), np.int32(_SIDE - 1))
+        # Unsigned indices: signed ones are tested for a count from the end.
+        code[k] = _CURVE[np.uint64(_SIDE * iu + iv)] >> shift
+    for k in range(np.uint64(n)):
+        count[np.uint64(code[k]) + np.uint64(1)] += 1
+    for f in range(np.uint64(fields)):
+        count[f + np.uint64(1)] += count[f]
+    for k in range(np.uint64(n)):
+        field = np.uint64(code[k])
+        p = count[field]
+        count[field] = p + 1
+        order[np.uint64(p)] = k

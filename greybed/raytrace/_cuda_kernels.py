@@ -27,7 +27,6 @@ def meet_all(
     room = Room(
         cuda.local.array((6, 1), np.float64),
         cuda.local.array(4, np.uint32),
-        cuda.local.array(1, np.int64),
         cuda.local.array(1, np.float64),
         cuda.local.array(1, np.float64),
         cuda.local.array(1, np.int64),

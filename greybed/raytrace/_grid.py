@@ -121,8 +121,11 @@ def build(
     shape = np.maximum(np.round(edge / cell_size).astype(np.int64), 1)
     cell = edge / shape
     n_cells = int(shape.prod())
+    # Spheres side by side in space side by side in memory: a ray then finds many of them in cache.
+    place = np.clip(np.floor((centres - low) / cell).astype(np.int64), 0, shape - 1)
+    order = np.argsort((place[:, 0] * shape[1] + place[:, 1]) * shape[2] + place[:, 2])
     start = np.zeros(n_cells + 1, np.int64)
-    geometry = (centres, radii, low, edge, cell, shape, periodic)
+    geometry = (centres[order], radii[order], low, edge, cell, shape, periodic)
     none = np.empty(0, np.uint32), np.empty(0), np.empty(0, np.int32), np.empty(0, np.int8)
     items, entries = _fill(*geometry, start, *none, False)
     np.cumsum(start, out=start)
@@ -130,6 +133,7 @@ def build(
     owner, image = np.empty(entries, np.int32), np.empty(3 * entries, np.int8)
     cursor = start.copy()
     _fill(*geometry, cursor, index, table, owner, image, True)
+    owner = order.astype(np.int32)[owner]
     nx, ny, nz = shape.tolist()
     frame = Frame(
         tuple(low.tolist()), tuple(edge.tolist()), tuple(cell.tolist()),

@@ -6,11 +6,17 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from greybed.raytrace._bundle import (
+from greybed.raytrace._blocks import (
     BLOCK,
+    Room,
+    distance_of,
+    first_neighbours,
+    in_blocks,
+    room_for_blocks,
+)
+from greybed.raytrace._bundle import (
     MOST,
     Places,
-    first_neighbours,
     gather,
     room_for_neighbours,
     sort_by_direction,
@@ -102,9 +108,17 @@ class Tables(NamedTuple):
 
 
 @njit(**_OPTIONS)
-def march_on(
-    m, pending, rays, ahead, bound, centre, images, frame, start, items, owner, image, key
-):
+def _outside(x, y, z, frame):
+    """Whether a place on a ray lies out of the bed: there is no way back, for a bed is convex."""
+    low, edge, periodic = frame.low, frame.edge, frame.periodic
+    out_x = ((x < low[0]) | (x > low[0] + edge[0])) & (not periodic[0])
+    out_y = ((y < low[1]) | (y > low[1] + edge[1])) & (not periodic[1])
+    out_z = ((z < low[2]) | (z > low[2] + edge[2])) & (not periodic[2])
+    return out_x | out_y | out_z
+
+
+@njit(**_OPTIONS)
+def march_on(m, rays, ahead, bound, centre, images, frame, start, items, owner, image, key):
     """Keys of what ``m`` pending rays meet that have come ``ahead`` [m] freely.
 
     One loop over all of them: arrays handed to a function for every ray would be reference-counted
@@ -115,17 +129,12 @@ def march_on(
         key[q] = ESCAPED
         if ahead[q] >= bound[q]:
             continue
-        k = pending[q]
-        dx, dy, dz = rays[0, k], rays[1, k], rays[2, k]
-        x, sx = wrapped(centre[0] + rays[3, k] + ahead[q] * dx, low[0], edge[0], periodic[0])
-        y, sy = wrapped(centre[1] + rays[4, k] + ahead[q] * dy, low[1], edge[1], periodic[1])
-        z, sz = wrapped(centre[2] + rays[5, k] + ahead[q] * dz, low[2], edge[2], periodic[2])
-        if ahead[q] > 0.0 and (
-            x < low[0] or x > low[0] + edge[0]
-            or y < low[1] or y > low[1] + edge[1]
-            or z < low[2] or z > low[2] + edge[2]
-        ):  # fmt: skip
-            continue  # out of the bed, and no way back
+        dx, dy, dz = rays[0, q], rays[1, q], rays[2, q]
+        x, sx = wrapped(centre[0] + rays[3, q] + ahead[q] * dx, low[0], edge[0], periodic[0])
+        y, sy = wrapped(centre[1] + rays[4, q] + ahead[q] * dy, low[1], edge[1], periodic[1])
+        z, sz = wrapped(centre[2] + rays[5, q] + ahead[q] * dz, low[2], edge[2], periodic[2])
+        if ahead[q] > 0.0 and _outside(x, y, z, frame):
+            continue
         _, item, mx, my, mz = march(x, y, z, dx, dy, dz, bound[q] - ahead[q], frame, start, items)
         if item >= 0:
             key[q] = _key(
@@ -161,6 +170,7 @@ def trace_sphere(
     numbers alone, so neither the order nor the thread of the work changes a bit of the result.
     """
     radius, clear = scene.radii[sphere], scene.clearance[sphere]
+    cx, cy, cz = scene.centres[sphere, 0], scene.centres[sphere, 1], scene.centres[sphere, 2]
     n = offsets[last] - offsets[first]
     hidden = not scene.exposed[sphere]
     rejected = _start_rays(
@@ -170,32 +180,28 @@ def trace_sphere(
         return 0, -1
     ball = radius + scene.places.reach
     found = gather(sphere, scene.centres, scene.radii, scene.places, ball, around)
-    raw, rays, order = work.raw, work.rays, work.order
+    raw, rays, order, waiting = work.raw, work.rays, work.order, work.waiting
+    single = work.single
     if found >= 0:
         sort_by_direction(n, raw, work.code, work.fields, order)
+        in_blocks(n, order, raw, work.distance, single)
     else:
         ball = 0.0
         for k in range(n):
             order[k] = k
-    for row in range(3):
-        for k in range(n):
-            rays[row, k] = raw[row, order[k]]
-        for k in range(n):
-            rays[3 + row, k] = raw[3 + row, order[k]] * radius
     code = work.code
     for r in range(first, last):
         for k in range(offsets[r] - offsets[first], offsets[r + 1] - offsets[first]):
             code[k] = r - first
     if found >= 0:
         first_neighbours(
-            n, radius, found, around, rays, work.distance, work.nearest, work.lists,
-            work.best, work.who,
-        )  # fmt: skip
+            n, found, around, raw, order, single, work.room, work.distance, work.nearest
+        )
     # Names for the arrays: through ``work`` each access would be reference-counted.
     keys, slots, counts = work.keys, work.slots, work.counts
     places, slot_of, part = work.places, work.slot_of, work.code
     index, reach = work.nearest, work.distance
-    hits, key_of = work.hit, work.key
+    hits, met, key_of = work.hit, work.met, work.key
     mask = keys.size - 1
     used = 0
     replicates = last - first
@@ -210,47 +216,72 @@ def trace_sphere(
                 counts[used, r] = 0
             used += 1
         slot_of[p] = slot
+    # Rays that escape are many in sparse beds: a slot of their own, which takes no search.
+    lost, place = slot_for(np.int64(ESCAPED), keys, slots, used, mask)
+    places[used] = place
+    for r in range(replicates):
+        counts[used, r] = 0
+    used += 1
     # Most rays end at a neighbour before anything else could matter; the others wait.
     pending, ahead, bound, wall = work.pending, work.ahead, work.bound, work.wall
+    safe = np.float32(min(min(ball, clear) - radius, limit) / radius - around.margins[1])
+    waits = n
+    if found >= 0:
+        waits = 0
+        slot_of[0] = slot_of[0] if found > 0 else 0
+        for k in range(np.uint64(n)):
+            # No branch: the processor would guess wrong too often. Rays that meet none count 0.
+            settled = reach[k] < safe
+            slot = slot_of[np.uint64(max(index[k], 0))]
+            counts[np.uint64(slot), np.uint64(part[np.uint64(order[k])])] += settled
+            waiting[np.uint64(waits)] = k
+            waits += not settled
+    frame, start, items, owner, image = scene.grid
     m = 0
-    for k in range(n):
-        hit, begin = -1, 0.0
+    for q in range(waits):
+        k = waiting[q] if found >= 0 else q
+        hit = np.int64(index[k]) if found >= 0 else -1
+        column = order[k]
+        dx, dy, dz = raw[0, column], raw[1, column], raw[2, column]
+        px, py, pz = raw[3, column] * radius, raw[4, column] * radius, raw[5, column] * radius
+        begin, distance = 0.0, np.inf
         if found >= 0:
-            hit, distance = index[k], reach[k]
-            if hit < 0 or radius + distance > ball:
-                # Where the ray leaves the ball inside which all spheres are known.
-                px, py, pz = rays[3, k], rays[4, k], rays[5, k]
-                along = px * rays[0, k] + py * rays[1, k] + pz * rays[2, k]
-                begin = math.sqrt(along * along + ball * ball - radius * radius) - along
-                if hit >= 0 and distance > begin:
-                    hit = -1
-            if hit >= 0 and radius + distance < clear and distance <= limit:
-                counts[slot_of[hit], part[order[k]]] += 1
-                continue
-        pending[m], hits[m], ahead[m], bound[m], wall[m] = k, hit, begin, limit, -1
+            # Where the ray leaves the ball inside which all spheres are known.
+            along = px * dx + py * dy + pz * dz
+            begin = math.sqrt(along * along + ball * ball - radius * radius) - along
+            if hit >= 0:
+                distance = distance_of(hit, around, radius, raw, column)
+                hit = -1 if distance > begin else hit
+        at_x, at_y, at_z = cx + px + begin * dx, cy + py + begin * dy, cz + pz + begin * dz
+        free = hit < 0 and begin < limit and clear == np.inf
+        if free and begin > 0.0 and _outside(at_x, at_y, at_z, frame):
+            counts[lost, part[column]] += 1
+            continue
+        rays[0, m], rays[1, m], rays[2, m] = dx, dy, dz
+        rays[3, m], rays[4, m], rays[5, m] = px, py, pz
+        # What is known already needs no march, only a look at the walls and the limit.
+        hits[m], met[m], ahead[m] = hit, distance, begin if hit < 0 else np.inf
+        pending[m], bound[m], wall[m] = column, limit, -1
         m += 1
     if clear < np.inf:
-        walls_ahead(m, pending, rays, scene.centres[sphere], scene.walls, bound, wall)
-    for q in range(m):
-        if hits[q] >= 0:
-            # Known already, but for the wall: nothing left to march for.
-            ahead[q] = np.inf
-    frame, start, items, owner, image = scene.grid
+        walls_ahead(m, rays, scene.centres[sphere], scene.walls, bound, wall)
     march_on(
-        m, pending, rays, ahead, bound, scene.centres[sphere], images, frame, start, items, owner,
+        m, rays, ahead, bound, scene.centres[sphere], images, frame, start, items, owner,
         image, key_of,
     )  # fmt: skip
     for q in range(m):
-        k = pending[q]
-        replicate = part[order[k]]
+        replicate = part[pending[q]]
         hit, key = hits[q], key_of[q]
-        if hit >= 0 and reach[k] < bound[q]:
+        if hit >= 0 and met[q] < bound[q]:
             counts[slot_of[hit], replicate] += 1
             continue
         if key == ESCAPED and wall[q] >= 0:
             key = np.int64(-1 - wall[q])
         elif key == ESCAPED and limit < np.inf:
-            key = at_limit(rays, k, scene.centres[sphere], limit, clear, frame, scene.walls)
+            key = at_limit(rays, q, scene.centres[sphere], limit, clear, frame, scene.walls)
+        if key == ESCAPED:
+            counts[lost, replicate] += 1
+            continue
         slot, place = slot_for(key, keys, slots, used, mask)
         if slot == used:
             places[used] = place
@@ -265,21 +296,22 @@ class Work(NamedTuple):
     """Scratch of one thread, for tasks of up to so many rays and replicates."""
 
     raw: np.ndarray  # (6, rays): direction, place on the unit sphere
-    rays: np.ndarray  # (6, rays): the same by direction, places in metres
-    order: np.ndarray  # (rays,) int64
-    code: np.ndarray  # (rays,) int64
+    single: np.ndarray  # (6 rays,) float32: the same by direction, in blocks
+    rays: np.ndarray  # (6, rays): those that no neighbour has settled, places in metres
+    order: np.ndarray  # (rays,) int32
+    code: np.ndarray  # (rays,) int16
     fields: np.ndarray  # (4097,) int64
-    distance: np.ndarray  # (rays,) [m]
-    nearest: np.ndarray  # (rays,) int64, neighbour
-    pending: np.ndarray  # (rays,) int64, rays that no neighbour has settled
+    distance: np.ndarray  # (rays,) float32, in radii
+    nearest: np.ndarray  # (rays,) int32, neighbour
+    waiting: np.ndarray  # (rays,) int32, rays that no neighbour has settled
+    pending: np.ndarray  # (rays,) int64, their columns
     hit: np.ndarray  # (rays,) int64, their neighbour or -1
+    met: np.ndarray  # (rays,) its distance [m]
     ahead: np.ndarray  # (rays,) how far they have come [m]
     bound: np.ndarray  # (rays,) how far they may go [m]
     wall: np.ndarray  # (rays,) int64, what is there, or -1
     key: np.ndarray  # (rays,) int64, what they meet
-    lists: np.ndarray  # (2, MOST) int64
-    best: np.ndarray  # (BLOCK,) [m]
-    who: np.ndarray  # (BLOCK,) int64
+    room: Room
     keys: np.ndarray  # (2^k,) int64
     slots: np.ndarray  # (2^k,) int64, -1 where free
     places: np.ndarray  # (slots,) int64
@@ -297,21 +329,22 @@ def room_for_tasks(rays, replicates):
     padded = rays + BLOCK
     return Work(
         np.empty((6, padded)),
+        np.empty(6 * padded, np.float32),
         np.empty((6, padded)),
-        np.empty(padded, np.int64),
-        np.empty(padded, np.int64),
+        np.empty(padded, np.int32),
+        np.empty(padded, np.int16),
         np.empty(4097, np.int64),
+        np.empty(padded, np.float32),
+        np.empty(padded, np.int32),
+        np.empty(padded, np.int32),
+        np.empty(padded, np.int64),
+        np.empty(padded, np.int64),
+        np.empty(padded),
+        np.empty(padded),
         np.empty(padded),
         np.empty(padded, np.int64),
         np.empty(padded, np.int64),
-        np.empty(padded, np.int64),
-        np.empty(padded),
-        np.empty(padded),
-        np.empty(padded, np.int64),
-        np.empty(padded, np.int64),
-        np.empty((2, MOST), np.int64),
-        np.empty(BLOCK),
-        np.empty(BLOCK, np.int64),
+        room_for_blocks(),
         np.empty(size, np.int64),
         np.full(size, -1, np.int64),
         np.empty(most, np.int64),

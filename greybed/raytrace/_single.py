@@ -34,7 +34,6 @@ class Room(NamedTuple):
 
     ray: np.ndarray  # (6, 1): direction, place relative to the centre [m]
     seeds: np.ndarray  # (4,) uint32
-    pending: np.ndarray  # (1,) int64, which is 0
     ahead: np.ndarray  # (1,) [m]
     bound: np.ndarray  # (1,) [m]
     wall: np.ndarray  # (1,) int64
@@ -75,13 +74,13 @@ def meet(sphere, number, replicate, offsets, seed, quasi, points, images, bed, l
             return np.int64(ESCAPED), np.int64(BURIED)
     for row in range(3, 6):
         ray[row, 0] *= radius
-    room.pending[0], room.ahead[0], room.bound[0], room.wall[0] = 0, 0.0, limit, -1
+    room.ahead[0], room.bound[0], room.wall[0] = 0.0, limit, -1
     centre = bed.centres[sphere]
     if bed.clearance[sphere] < np.inf:
-        walls_ahead(1, room.pending, ray, centre, bed.walls, room.bound, room.wall)
+        walls_ahead(1, ray, centre, bed.walls, room.bound, room.wall)
     frame, start, items, owner, image = bed.grid
     march_on(
-        1, room.pending, ray, room.ahead, room.bound, centre, images, frame, start, items, owner,
+        1, ray, room.ahead, room.bound, centre, images, frame, start, items, owner,
         image, room.key,
     )  # fmt: skip
     key = room.key[0]

@@ -109,16 +109,15 @@ def wall_hit(ox, oy, oz, dx, dy, dz, walls):
 
 
 @njit(**_OPTIONS)
-def walls_ahead(m, pending, rays, centre, walls, bound, wall):
+def walls_ahead(m, rays, centre, walls, bound, wall):
     """Nearest wall of ``m`` rays, where it is nearer than their ``bound`` [m], which it lowers.
 
     ``rays`` (6, n) holds directions and starts relative to ``centre`` [m].
     """
     for q in range(m):
-        k = pending[q]
         t, number = wall_hit_within(
-            centre[0] + rays[3, k], centre[1] + rays[4, k], centre[2] + rays[5, k],
-            rays[0, k], rays[1, k], rays[2, k], bound[q], walls,
+            centre[0] + rays[3, q], centre[1] + rays[4, q], centre[2] + rays[5, q],
+            rays[0, q], rays[1, q], rays[2, q], bound[q], walls,
         )  # fmt: skip
         if number >= 0:
             bound[q], wall[q] = t, number

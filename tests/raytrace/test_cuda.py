@@ -32,7 +32,7 @@ class Here(cuda.Device):
 
     def _launch(self, tasks, begin, offsets, seed, quasi, points, images, limit):
         room = _single.Room(
-            np.empty((6, 1)), np.empty(4, np.uint32), np.empty(1, np.int64), np.empty(1),
+            np.empty((6, 1)), np.empty(4, np.uint32), np.empty(1),
             np.empty(1), np.empty(1, np.int64), np.empty(1, np.int64),
         )  # fmt: skip
         met, lost = np.empty(begin[-1], np.int64), np.zeros(len(tasks), np.int64)
@@ -66,8 +66,9 @@ BOUNDED = [Disc((0.5, 0.5, 0.5), (0, 0, 1), 0.4), *box_walls((-0.1, -0.1, -0.1),
         (overlapping(UNBOUNDED), {}),
         (overlapping(UNBOUNDED), {"sampling": "random", "emitters": [3, 17]}),
         (overlapping(BOUNDED), {}),
+        (overlapping(BOUNDED), {"max_distance": 0.2}),
     ],
-    ids=["images", "random", "max_distance", "unbounded", "unbounded_random", "bounded"],
+    ids=["images", "random", "max_distance", "unbounded", "unbounded_random", "bounded", "both"],
 )
 def test_single_rays_give_the_same_counts(packing, options, monkeypatch):
     monkeypatch.setattr(cuda, "Device", Here)
