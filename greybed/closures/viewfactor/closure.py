@@ -199,7 +199,8 @@ class ViewFactorClosure:
         exact = self.markers.exact(flat)
         # A sum of two positive parts: 1 - gate (1 - share) would cancel where little is visible,
         # and with it reciprocity.
-        factor = exact * ((1.0 - gate) + gate * share)
+        clear = 1.0 - gate if self.markers.clear is None else self.markers.clear(flat)
+        factor = exact * (clear + gate * share)
         error = exact * gate * spread(self.kind, raw[:, 1])
         outside = self.domain.outside(features) & (gate > 0.0)
         return Prediction(factor.reshape(shape), error.reshape(shape), outside.reshape(shape))
