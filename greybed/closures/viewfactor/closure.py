@@ -20,6 +20,7 @@ from greybed.core import Packing, RangeError
 
 if TYPE_CHECKING:
     from greybed.closures.viewfactor.bed import BedFactors
+    from greybed.core.diffuse import DiffuseExchange
     from greybed.core.rows import Rows
 
 Array = NDArray[np.float64]
@@ -237,6 +238,49 @@ class ViewFactorClosure:
 
         bed = self.bed_factors(packing, **options)
         return balanced(Rows.of(bed, packing))
+
+    def exchange(
+        self,
+        packing: Packing,
+        emissivity: ArrayLike,
+        *,
+        wall_emissivity: ArrayLike = 1.0,
+        wall_exchange: ArrayLike | None = None,
+        **options: Any,
+    ) -> DiffuseExchange:
+        """Exchange factors of a whole bed, by one radiosity per sphere and wall.
+
+        Parameters
+        ----------
+        packing : Packing
+            The bed, with its walls.
+        emissivity : array_like, shape () or (n,)
+            Of the spheres, 0.001 ... 1 [-].
+        wall_emissivity : array_like, shape () or (n_walls,)
+            Of the walls, 0 ... 1 [-].
+        wall_exchange : array_like, shape (n_walls, n_walls), optional
+            Exchange areas A F between the walls themselves [m2], for grey walls.
+        **options
+            Those of :meth:`factors`.
+
+        Returns
+        -------
+        DiffuseExchange
+            ``emitted_by(spheres)`` gives rows, ``rows()`` all of them, ``heats(power)`` net heats.
+
+        Raises
+        ------
+        InputError
+            As :meth:`factors` and :func:`greybed.core.diffuse.diffuse_exchange`.
+        """
+        from greybed.core.diffuse import diffuse_exchange
+
+        return diffuse_exchange(
+            self.factors(packing, **options),
+            emissivity,
+            wall_emissivity=wall_emissivity,
+            wall_exchange=wall_exchange,
+        )
 
     def _checked(self, markers: dict[str, ArrayLike]) -> dict[str, Array]:
         wanted, given = set(self.marker_names), set(markers)
