@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from greybed.closures import ViewFactorClosure, golden_rows
 from greybed.closures.predictors import Forest, Network
-from greybed.closures.viewfactor.exact import TOUCHING, quadrature
 from greybed.closures.viewfactor.visibility import ODDS_BOUND, SPREAD_BOUND
 from greybed.core import InputError
+from greybed.core.exact import TOUCHING, quadrature
 from greybed.core.files import atomic_path, output_folder
 from greybed.export.metadata import (
     LICENCE,

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from greybed.closures.viewfactor.exact import pair_factor
 from greybed.closures.viewfactor.markers import pair_markers
 from greybed.closures.viewfactor.neighbourhood import neighbourhood
 from greybed.closures.viewfactor.walls import WallMarkers, wall_markers
 from greybed.core import InputError, Packing, RangeError
+from greybed.core.exact import pair_factor
 
 if TYPE_CHECKING:
     from greybed.closures.viewfactor.closure import ViewFactorClosure

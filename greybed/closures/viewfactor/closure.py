@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from greybed.closures.predictors import PREDICTORS, Predictor
-from greybed.closures.viewfactor.exact import TOUCHING
 from greybed.closures.viewfactor.visibility import (
     MARKER_SETS,
     MarkerSet,
@@ -17,6 +16,7 @@ from greybed.closures.viewfactor.visibility import (
     unblocked_share,
 )
 from greybed.core import Packing, RangeError
+from greybed.core.exact import TOUCHING
 
 if TYPE_CHECKING:
     from greybed.closures.viewfactor.bed import BedFactors

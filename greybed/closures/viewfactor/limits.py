@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from greybed.closures.viewfactor.closure import ViewFactorClosure
-from greybed.closures.viewfactor.exact import exact_view_factor, pair_factor
+from greybed.core.exact import exact_view_factor, pair_factor
 
 Array = NDArray[np.float64]
 # Anything that maps markers to factors: a closure, an ONNX session, a compiled library.

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from greybed.closures.viewfactor.exact import pair_factor
+from greybed.core.exact import pair_factor
 
 Array = NDArray[np.float64]
 Markers = dict[str, Array]
