@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 # Below it light between surfaces that hardly absorb travels on and on.
 LEAST_EMISSIVITY = 1e-3
 # Right-hand sides that are solved at once: their memory is this times the number of surfaces.
-BLOCK = 256
+BLOCK = 64
 # Rows of every sphere are a full matrix.
 MOST_ROWS = 10_000
 _TOLERANCE = 1e-15
