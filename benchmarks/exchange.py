@@ -1,4 +1,4 @@
-"""Exchange factors of whole beds by one radiosity per sphere, beside traced reflecting paths.
+"""Exchange factors of whole beds by a diffuse network, beside traced reflecting paths.
 
 Run: python benchmarks/exchange.py --out runs/exchange.json
 
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -103,11 +104,11 @@ def measured(packing: Packing, name: str, rays: int) -> list[dict[str, Any]]:
     for k, emissivity in enumerate(EMISSIVITIES):
         halves = [balanced(Rows.of(trace[k], packing)) for trace in traces]
         truths = [full(half) for half in halves]
-        for source, view in views.items():
+        for (source, view), sides in product(views.items(), (1, 24)):
             begin = time.perf_counter()
-            rows = diffuse_exchange(view, emissivity).rows()
+            rows = diffuse_exchange(view, emissivity, packing=packing, sides=sides).rows()
             row: dict[str, Any] = {
-                "bed": name, "emissivity": emissivity, "source": source,
+                "bed": name, "emissivity": emissivity, "source": f"{source}, {sides} sides",
                 "seconds": time.perf_counter() - begin, "imbalance": rows.imbalance,
             }  # fmt: skip
             row |= {

@@ -246,9 +246,10 @@ class ViewFactorClosure:
         *,
         wall_emissivity: ArrayLike = 1.0,
         wall_exchange: ArrayLike | None = None,
+        sides: int = 24,
         **options: Any,
     ) -> DiffuseExchange:
-        """Exchange factors of a whole bed, by one radiosity per sphere and wall.
+        """Exchange factors of a whole bed, each sphere cut into sides that reflect evenly.
 
         Parameters
         ----------
@@ -260,6 +261,8 @@ class ViewFactorClosure:
             Of the walls, 0 ... 1 [-].
         wall_exchange : array_like, shape (n_walls, n_walls), optional
             Exchange areas A F between the walls themselves [m2], for grey walls.
+        sides : int
+            Sides of each sphere [-]; 1 for one radiosity per sphere, quicker and biased.
         **options
             Those of :meth:`factors`.
 
@@ -280,6 +283,8 @@ class ViewFactorClosure:
             emissivity,
             wall_emissivity=wall_emissivity,
             wall_exchange=wall_exchange,
+            packing=packing,
+            sides=sides,
         )
 
     def _checked(self, markers: dict[str, ArrayLike]) -> dict[str, Array]:
