@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_matrix, diags
 
+from greybed.core.conjugate import conjugate_gradients
 from greybed.core.errors import InputError
 from greybed.core.packing import Packing
 from greybed.core.rows import Rows, balanced
@@ -36,7 +37,6 @@ BLOCK = 32
 MOST_SIDES = 1000
 # Rows of every sphere are a full matrix.
 MOST_ROWS = 10_000
-_TOLERANCE = 1e-15
 
 
 class Shares(NamedTuple):
@@ -122,7 +122,6 @@ class DiffuseExchange:
         a = self.view.areas
         if self.packing is not None and self.sides > 1:
             pairs, back, outside = by_sides(self.packing, self.view, self.sides)
-            turned = pairs.T.tocsr()
         else:
             inner = diags(a) @ self.view.factors
             inner = (0.5 * (inner + inner.T)).tocsr()
@@ -134,7 +133,7 @@ class DiffuseExchange:
 
         def apply(v: Array) -> Array:
             first = v[:size]
-            inside = inner @ first if self.sides == 1 else turned @ (pairs @ first)[back]
+            inside = inner @ first if self.sides == 1 else pairs.T @ (pairs @ first)[back]
             return np.concatenate(
                 [inside + outer @ v[size:], outer_turned @ first + between @ v[size:]]
             )
@@ -177,7 +176,7 @@ class DiffuseExchange:
         a = np.where(self._node_areas > 0.0, self._node_areas, 1.0)[:, None]
         root = np.sqrt(1.0 - self._absorbed)[owner][:, None]
         sent = (self._absorbed[:, None] * power)[owner]
-        y = _conjugate_gradients(lambda v: a * v - root * s(root * v), root * s(sent), 1.0 / a)
+        y = conjugate_gradients(lambda v: a * v - root * s(root * v), root * s(sent), 1.0 / a)
         irradiation: Array = self._mean @ (s(sent + root * y) / a)
         return irradiation
 
@@ -381,29 +380,3 @@ def _share(values: ArrayLike, n: int, name: str, least: float) -> Array:
     if bad.any():
         raise InputError(f"{name} = {array[bad][0]:g} [-] is outside {least:g} ... 1; mend it.")
     return array
-
-
-def _conjugate_gradients(apply: Any, right: Array, pivot: Array) -> Array:
-    """Solve for all columns at once: a symmetric positive definite matrix, scaled by ``pivot``.
-
-    Own loop, for many right-hand sides at once and sums in a fixed order.
-    """
-    x = np.zeros_like(right)
-    rest = right.copy()
-    step = pivot * rest
-    old = (rest * step).sum(axis=0)
-    goal = _TOLERANCE**2 * old
-    for _ in range(10_000):
-        if (old <= goal).all():
-            break
-        moved = apply(step)
-        curvature = (step * moved).sum(axis=0)
-        # A column that has arrived stays where it is.
-        length = np.divide(old, curvature, out=np.zeros_like(old), where=curvature > 0.0)
-        x += length * step
-        rest -= length * moved
-        scaled = pivot * rest
-        new = (rest * scaled).sum(axis=0)
-        step = scaled + np.divide(new, old, out=np.zeros_like(new), where=old > 0.0) * step
-        old = new
-    return x

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, diags
 
 from greybed.core.packing import Packing
 from greybed.core.rows import Rows
@@ -89,8 +89,10 @@ def by_sides(packing: Packing, view: Rows, sides: int) -> tuple[csr_matrix, NDAr
         Exchange areas with walls and, last, the opening [m2].
     """
     n = len(packing)
-    f = view.factors.tocsr()
-    f.sum_duplicates()
+    # Symmetric to the last digit, so that every entry has its counterpart.
+    both = diags(view.areas) @ view.factors
+    f = csr_matrix(diags(0.5 / view.areas) @ (both + both.T))
+    f.sort_indices()
     f.eliminate_zeros()
     place = csr_matrix((np.arange(1.0, f.nnz + 1.0), f.indices, f.indptr), f.shape)
     turned = place.T.tocsr()
