@@ -174,7 +174,7 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", help="data set to train on; without it shipped closures")
-    parser.add_argument("--epochs", type=int, default=40)
+    parser.add_argument("--epochs", type=int)
     parser.add_argument("--emitters", type=int, default=12, help="per held-out packing")
     parser.add_argument("--rays", type=int, default=2_000_000, help="per emitter of the truth")
     parser.add_argument("--bed-rays", type=int, default=100_000, help="per sphere, twice")

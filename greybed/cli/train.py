@@ -29,7 +29,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "exchange: absorption after reflections (default: pencil)",
     )
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="default: 0")
-    parser.add_argument("--epochs", type=int, default=40, metavar="N", help="default: 40")
+    parser.add_argument(
+        "--epochs", type=int, metavar="N", help="default: 40, up to 600 where rows are few"
+    )
     parser.add_argument(
         "--no-curve", action="store_true", help="leave out the learning curve, which takes as long "
         "as the training itself",
@@ -51,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
     from greybed.training import learning_curve, train
     from greybed.training.viewfactor import rows_for
 
-    if options.epochs < 1:
+    if options.epochs is not None and options.epochs < 1:
         raise InputError(f"--epochs = {options.epochs} must be at least 1.")
     quantity = MARKER_SETS[options.markers].quantity
     name = f"{quantity}_{options.model}_{options.markers}"

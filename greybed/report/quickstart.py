@@ -172,7 +172,7 @@ def _train(folder: Path, data: ViewFactorData, seed: int, small: bool) -> Result
         name = f"viewfactor_{kind}_{markers}"
         begin = time.perf_counter()
         closure = train(
-            data, kind, markers, seed=seed, epochs=4 if small else 40, show_progress=not small
+            data, kind, markers, seed=seed, epochs=4 if small else None, show_progress=not small
         )
         path = save(closure, folder / (name + SUFFIX))
         written.append(path)

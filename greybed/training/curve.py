@@ -41,7 +41,7 @@ def learning_curve(
     *,
     shares: Sequence[float] = SHARES,
     seed: int = 0,
-    epochs: int = 40,
+    epochs: int | None = None,
 ) -> list[dict[str, Any]]:
     """Train on growing parts of the training packings and score on the same held-out ones.
 

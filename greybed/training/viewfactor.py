@@ -20,6 +20,9 @@ from greybed.training.score import score
 
 MOST_ROWS = 250_000
 MOST_EPOCHS = 100_000
+# Passes over the training rows, and how many rows a fit sees at least in all of them.
+LEAST_EPOCHS = 40
+ROWS_TO_SEE = 2_400_000
 
 
 def rows_for(data: ViewFactorData, markers: MarkerSet) -> ViewFactorData:
@@ -32,13 +35,21 @@ def rows_for(data: ViewFactorData, markers: MarkerSet) -> ViewFactorData:
     return none if rows is None else rows
 
 
+def epochs_for(rows: int) -> int:
+    """Passes over so many training rows: 40, and more of them where the rows are few.
+
+    A fit needs steps: with 40 passes over 4,000 rows to walls, small factors came out high.
+    """
+    return max(LEAST_EPOCHS, min(600, -(-ROWS_TO_SEE // rows)))
+
+
 def train(
     data: ViewFactorData,
     kind: str = "mlp",
     markers: str = "pencil",
     *,
     seed: int = 0,
-    epochs: int = 40,
+    epochs: int | None = None,
     show_progress: bool = False,
 ) -> ViewFactorClosure:
     """Train a closure; the score on the held-out packings is in its card.
@@ -54,8 +65,8 @@ def train(
         ``exchange`` for exchange factors of pairs.
     seed : int
         Seed of the fit.
-    epochs : int
-        Passes of the network over the training rows [-].
+    epochs : int, optional
+        Passes of the network over the training rows [-]; by default :func:`epochs_for` so many.
     show_progress : bool
         Draw a progress bar.
 
@@ -66,7 +77,7 @@ def train(
     """
     if not 0 <= seed <= MOST_SEED:
         raise InputError(f"seed = {seed} [-] must lie in 0 ... {MOST_SEED}; mend it.")
-    if not 1 <= epochs <= MOST_EPOCHS:
+    if epochs is not None and not 1 <= epochs <= MOST_EPOCHS:
         raise InputError(f"epochs = {epochs} [-] must lie in 1 ... {MOST_EPOCHS}; mend it.")
     marker_set = MARKER_SETS[markers]
     data, beds = rows_for(data, marker_set), ""
@@ -84,6 +95,7 @@ def train(
     if kind == "mlp":
         from greybed.training.network import fit_network
 
+        epochs = epochs_for(len(fitted)) if epochs is None else epochs
         label = f"training {kind} on {markers} markers"
         with progress(epochs, label, show=show_progress) as advance:
             predictor = fit_network(fitted, held, seed=seed, epochs=epochs, on_epoch=advance)
