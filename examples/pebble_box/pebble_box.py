@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from greybed.core import Packing, Plane
+from greybed.core import Packing, box_walls
 from greybed.coupling import pairwise_network, radiative_network
 from greybed.datasets.containers import Box
 from greybed.datasets.generate import random_packing
 from greybed.datasets.sizes import Mono
-from greybed.raytrace import exchange_factors, exchange_of_rays, radiative_exchange_factor
+from greybed.raytrace import exchange_factors, radiative_exchange_factor
 
 SIGMA = 5.670374419e-8  # [W/m2/K4]
 SPHERES, DIAMETER, EDGE = 332, 0.06, 0.42  # [-], [m], [m]
@@ -30,51 +30,37 @@ def pebbles(seed):
     """The bed, with its six walls."""
     solid = SPHERES * np.pi / 6.0 * DIAMETER**3 / EDGE**3
     bed = random_packing(SPHERES, solid, Mono(0.5 * DIAMETER), container=Box(), seed=seed)
-    walls = []
-    for axis in range(3):
-        for corner, sign in ((0.0, 1.0), (EDGE, -1.0)):
-            normal = sign * np.eye(3)[axis]
-            walls.append(Plane((corner,) * 3, tuple(normal), f"{'xyz'[axis]}{sign:+.0f}"))
+    walls = box_walls((0.0, 0.0, 0.0), (EDGE, EDGE, EDGE))
     return Packing(bed.centres, bed.radii, walls=walls, source="pebble box"), solid
 
 
-def wall_rays(wall, count, seed):
-    """Starts and cosine-law directions of rays from the hot (0) or cold (1) wall."""
-    rng = np.random.default_rng([seed, wall])
-    origins = np.column_stack([np.full(count, wall * EDGE), rng.uniform(0.0, EDGE, (count, 2))])
-    share, turn = rng.uniform(size=count), rng.uniform(0.0, 2.0 * np.pi, count)
-    flat = np.sqrt(share)
-    into = (1.0 - 2.0 * wall) * np.sqrt(1.0 - share)
-    return origins, np.column_stack([into, flat * np.cos(turn), flat * np.sin(turn)])
-
-
 def traced(bed, rays, seed):
-    """Exchange factors D and view factors F (sides folded in), and those between the walls."""
-    optics = {"emissivity": [EMISSIVITY, 1.0], "wall_emissivity": [GREY, BLACK], "seed": seed}
-    factors = exchange_factors(bed, rays=rays, **optics)
-    count = 50 * rays
-    sent = [exchange_of_rays(bed, *wall_rays(w, count, seed), **optics) for w in (0, 1)]
-    between, closure = [], []
-    for k, eps in enumerate((EMISSIVITY, 1.0)):
-        area = np.zeros((6, 6))
-        for w in (0, 1):
-            area[w] = EDGE**2 * eps * sent[w][k].wall_factors
-        area[2:] = 0.0
-        between.append(0.5 * (area + area.T))
+    """Exchange factors D and view factors F (sides folded in), walls' own rows with them."""
+    factors = exchange_factors(
+        bed, [EMISSIVITY, 1.0], wall_emissivity=[GREY, BLACK], rays=rays, wall_rays=50 * rays,
+        seed=seed,
+    )  # fmt: skip
+    closure = []
+    for rows in factors:
         # Reciprocity: what spheres send to a wall and what it sends itself fill its A eps.
-        to_wall = factors[k].emission_areas @ factors[k].wall_factors
-        closure.append((to_wall + between[k].sum(axis=1))[:2] / (EDGE**2 * eps) - 1.0)
-    return factors, between, np.abs(closure).max()
+        to_wall = rows.emission_areas @ rows.wall_factors
+        full = EDGE**2 * rows.wall_emissivity[:2]
+        closure.append((to_wall + rows.wall_exchange.sum(axis=1))[:2] / full - 1.0)
+    return factors, np.abs(closure).max()
 
 
-def solve(factors, between, **conditions):
+def solve(factors, **conditions):
     """Results of all models under the same conditions."""
     exchange, view = factors
     # An F closed at its walls: they are grey to the network, not to the rays.
-    grey = {"emissivity": EMISSIVITY, "wall_emissivity": EMISSIVITY, "wall_exchange": between[1]}
+    grey = {
+        "emissivity": EMISSIVITY,
+        "wall_emissivity": EMISSIVITY,
+        "wall_exchange": view.wall_exchange,
+    }
     ask = {"wall_temperatures": GIVEN, **conditions}
     return {
-        "D": radiative_network(exchange, wall_exchange=between[0], **ask),
+        "D": radiative_network(exchange, **ask),
         "Gebhart F": radiative_network(view, **grey, **ask),
         "pairwise F": pairwise_network(view, wall_areas=EDGE**2, **grey, **ask),
     }
@@ -107,15 +93,13 @@ def run(rays, seed=1, packing_seed=1):
     """All numbers of the example: summary, table of models, layers."""
     begin = time.perf_counter()
     bed, solid = pebbles(packing_seed)
-    factors, between, closure = traced(bed, rays, seed)
-    other, other_between, _ = traced(bed, rays, seed + 1000)
-    at_rest = solve(factors, between)
+    factors, closure = traced(bed, rays, seed)
+    other, _ = traced(bed, rays, seed + 1000)
+    at_rest = solve(factors)
     # In equilibrium no sphere gives off heat; all of them hot, they lose it to the cold wall.
-    loss = solve(factors, between, temperatures=HOT)
-    again = radiative_network(other[0], wall_exchange=other_between[0], wall_temperatures=GIVEN)
-    again_loss = radiative_network(
-        other[0], wall_exchange=other_between[0], wall_temperatures=GIVEN, temperatures=HOT
-    )
+    loss = solve(factors, temperatures=HOT)
+    again = radiative_network(other[0], wall_temperatures=GIVEN)
+    again_loss = radiative_network(other[0], wall_temperatures=GIVEN, temperatures=HOT)
     runs = {name: (at_rest[name], loss[name]) for name in at_rest}
     runs["D, other rays"] = again, again_loss
     reference = at_rest["D"]

@@ -4,12 +4,13 @@ Examples:
   greybed trace greybed/datasets/packings/settled_mono_4k.dump --rays 10000 --out runs/trace
   greybed trace bed.csv --wall plane:0,0,0:0,0,1 --wall cylinder:0,0,0:0,0,1:30mm --out runs/trace
   greybed trace bed.csv --wall mesh:oven.stl:mm --wall disc:0,0,0:0,0,1:30mm --out runs/trace
+  greybed trace bed.csv --emissivity 0.3,0.8 --out runs/exchange
 
-Writes view_factors.h5 and summary.json. A run that was stopped, however abruptly, goes on where
-it stopped when the same command is given again, and ends with the same bits. So do runs on
-different numbers of threads, on several processes (--workers) and on the workers of a
-dask.distributed scheduler (--scheduler). Memory does not grow with the number of factors, but for
---smooth and --rel-error.
+Writes view_factors.h5, with --emissivity exchange_factors.h5 instead, and summary.json. A run
+that was stopped, however abruptly, goes on where it stopped when the same command is given again,
+and ends with the same bits. So do runs on different numbers of threads, on several processes
+(--workers) and on the workers of a dask.distributed scheduler (--scheduler). Memory does not grow
+with the number of factors, but for --smooth, --rel-error and --emissivity.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from greybed.cli.info import add_input_arguments
+from greybed.cli.trace_exchange import add_exchange_arguments, refuse_mixtures, run_exchange
 from greybed.cli.walls import parse_walls
 
 if TYPE_CHECKING:
@@ -84,6 +86,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="make factors reciprocal and rows add up to one, with the errors that remain",
     )
+    parser.add_argument(
+        "--device",
+        choices=("cpu", "cuda"),
+        default="cpu",
+        help="cuda traces on an NVIDIA GPU (needs greybed[gpu])",
+    )
+    add_exchange_arguments(parser)
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
 
 
@@ -125,12 +134,14 @@ def run(options: argparse.Namespace) -> int:
     from greybed.core.processors import available_threads
     from greybed.core.readers import read_packing
     from greybed.core.units import parse_quantity
+    from greybed.datasets.exchanging import forget_blocks
     from greybed.datasets.factors_file import block_of, write_factors
     from greybed.datasets.tracing import STATE, Settings, trace_in_blocks
     from greybed.raytrace import smoothed, view_factors
 
     if options.rel_error is not None and (options.workers or options.scheduler):
         raise InputError("--rel-error traces in one go: leave out --workers and --scheduler.")
+    refuse_mixtures(options)
     names = [f"{text.partition(':')[0]}_{k + 1}" for k, text in enumerate(options.wall)]
     walls = [
         wall
@@ -145,6 +156,14 @@ def run(options: argparse.Namespace) -> int:
     folder = output_folder(options.out)
     path = folder / FILE
     with sole_writer(folder / f"{STATE}.lock"):
+        if options.emissivity is not None:
+            results, found, path = run_exchange(options, packing, folder, limit)
+            summary = write_summary(folder, "trace", results, options.file, seed=options.seed)
+            forget_blocks(folder)
+            if found:
+                print(f"went on from a stopped run: {found} of {n} spheres were done")
+            print(f"wrote {path}\nwrote {summary}")
+            return 0
         traced, found = None, 0
         result: ViewFactors | None = None
         if options.rel_error is not None:
@@ -157,6 +176,7 @@ def run(options: argparse.Namespace) -> int:
                 threads=options.threads,
                 max_distance=limit,
                 smooth=options.smooth,
+                device=options.device,
                 show_progress=not options.quiet,
             )
             seconds = result.seconds
@@ -164,7 +184,7 @@ def run(options: argparse.Namespace) -> int:
             traced = trace_in_blocks(
                 packing,
                 folder,
-                Settings(options.rays, options.seed, limit),
+                Settings(options.rays, options.seed, limit, options.device),
                 threads=options.threads,
                 workers=options.workers,
                 scheduler=options.scheduler,

@@ -139,6 +139,12 @@ class ThermalCase:
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise InputError(f"wall: name {twice[0]!r} is used twice; give every wall its own.")
+        grey = [w for w in self.wall if w.emissivity < 1.0]
+        if grey and not self.radiation.reflections:
+            raise InputError(
+                f"wall {grey[0].name!r}: emissivity = {grey[0].emissivity:g} [-] needs "
+                "radiation.reflections = true; set it, or leave the emissivity out."
+            )
 
     @property
     def walls(self) -> tuple[Wall, ...]:
@@ -162,7 +168,7 @@ def view_factors(
 ) -> Rows | None:
     """Rows of view or exchange factors from where the case says, or None without radiation.
 
-    With exchange factors adiabatic walls reflect diffusely, the others are black.
+    With exchange factors adiabatic walls re-radiate all, the others have their emissivity.
 
     Parameters
     ----------
@@ -200,7 +206,7 @@ def view_factors(
             "show_progress": show,
         }
         if radiation.reflections:
-            absorbs = [float(w.temperature is not None) for w in case.wall]
+            absorbs = [0.0 if w.temperature is None else w.emissivity for w in case.wall]
             grey = case.material.emissivity
             (result,) = raytrace.exchange_factors(
                 packing, grey, wall_emissivity=absorbs if absorbs else 1.0, **how

@@ -28,6 +28,8 @@ class PlaneTable:
     normal: tuple[float, float, float] = vector("dimensionless")  # into the bed, any length [-]
     temperature: float | None = quantity("temperature", None, above=0.0)  # [K]
     heat: str = choice(HEAT, "fixed")
+    # Below 1 with radiation.reflections only [-].
+    emissivity: float = quantity("dimensionless", 1.0, above=0.0, at_most=1.0)
 
     def __post_init__(self) -> None:
         check_heat(f"wall {self.name!r}", self.temperature, self.heat)
@@ -48,6 +50,8 @@ class CylinderTable:
     length: float | None = quantity("length", None, above=0.0)  # from point on; None: no end [m]
     temperature: float | None = quantity("temperature", None, above=0.0)  # [K]
     heat: str = choice(HEAT, "fixed")
+    # Below 1 with radiation.reflections only [-].
+    emissivity: float = quantity("dimensionless", 1.0, above=0.0, at_most=1.0)
 
     def __post_init__(self) -> None:
         check_heat(f"wall {self.name!r}", self.temperature, self.heat)
@@ -69,6 +73,8 @@ class ConeTable:
     length: float = quantity("length", above=0.0)  # [m]
     temperature: float | None = quantity("temperature", None, above=0.0)  # [K]
     heat: str = choice(HEAT, "fixed")
+    # Below 1 with radiation.reflections only [-].
+    emissivity: float = quantity("dimensionless", 1.0, above=0.0, at_most=1.0)
 
     def __post_init__(self) -> None:
         check_heat(f"wall {self.name!r}", self.temperature, self.heat)
@@ -88,6 +94,8 @@ class DiscTable:
     radius: float = quantity("length", above=0.0)  # [m]
     temperature: float | None = quantity("temperature", None, above=0.0)  # [K]
     heat: str = choice(HEAT, "fixed")
+    # Below 1 with radiation.reflections only [-].
+    emissivity: float = quantity("dimensionless", 1.0, above=0.0, at_most=1.0)
 
     def __post_init__(self) -> None:
         check_heat(f"wall {self.name!r}", self.temperature, self.heat)
@@ -106,6 +114,8 @@ class MeshTable:
     unit: str = "m"  # of the file
     temperature: float | None = quantity("temperature", None, above=0.0)  # [K]
     heat: str = choice(HEAT, "fixed")
+    # Below 1 with radiation.reflections only [-].
+    emissivity: float = quantity("dimensionless", 1.0, above=0.0, at_most=1.0)
 
     def __post_init__(self) -> None:
         check_heat(f"wall {self.name!r}", self.temperature, self.heat)

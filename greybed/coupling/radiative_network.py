@@ -98,7 +98,8 @@ def radiative_network(
         With view factors only, in (0, 1] [-]; exchange factors have it inside.
     wall_exchange : array_like, shape (n_walls, n_walls), optional
         Exchange areas between the walls themselves, symmetric: A F or, with exchange factors,
-        A epsilon D [m2]. Zero by default: heat from wall to wall is then not counted.
+        A epsilon D [m2]. By default that of exchange factors with ``patches``, else zero: heat
+        from wall to wall is then not counted.
 
     Returns
     -------
@@ -138,6 +139,8 @@ def radiative_network(
     known, given, given_walls = _conditions(
         n, n_walls, temperatures, heats, wall_temperatures, wall_heats, environment_temperature
     )
+    if wall_exchange is None and direct:
+        wall_exchange = getattr(factors, "wall_exchange", None)
     a = rows.areas[:, None]
     outside = a * np.column_stack([rows.wall_factors, rows.escaped])
     exchange, areas = _nodes(diags(rows.areas) @ rows.factors, outside, given_walls, wall_exchange)

@@ -48,6 +48,7 @@ ROW_ARRAYS = {
 SPHERE_ARRAYS = (
     "escaped", "escaped_stderr", "environment", "environment_stderr", "buried", "areas",
 )  # fmt: skip
+SQUARE_METRES = ("areas", "spread", "spread_stderr")
 ROW_NAMES = ("wall_factors", *ROW_ARRAYS.values())
 
 
@@ -217,7 +218,7 @@ def write_blocks(
         root.attrs["wall_names"] = np.bytes_(json.dumps([wall.name for wall in packing.walls]))
         for name, part_of in ENTRY_ARRAYS.items():
             kind = np.int32 if part_of == "indices" else np.float64
-            target = _created(root, name, (int(start[-1]),), kind)
+            target = created(root, name, (int(start[-1]),), kind)
             begin = 0
             for slab in _slabs(block[part_of] for block in blocks):
                 target[begin : begin + len(slab)] = slab
@@ -230,17 +231,17 @@ def write_blocks(
             **{place: rows(name) for place, name in ROW_ARRAYS.items()},
         }
         for name, values in per_row.items():
-            _created(root, name, values.shape, values.dtype)[...] = values
+            created(root, name, values.shape, values.dtype)[...] = values
     return Path(path)
 
 
-def _created(root: Any, name: str, shape: tuple[int, ...], kind: Any) -> Any:
+def created(root: Any, name: str, shape: tuple[int, ...], kind: Any) -> Any:
     """An empty dataset with its unit, checked where there is something to check."""
     size = math.prod(shape)
     rows = max(1, min(shape[0], CHUNK * shape[0] // max(size, 1)))
     checked = {"chunks": (rows, *shape[1:]), "fletcher32": True} if size else {}
     dataset = root.create_dataset(name, shape, kind, **checked)
-    dataset.attrs["units"] = np.bytes_("m2" if name == "areas" else "-")
+    dataset.attrs["units"] = np.bytes_("m2" if name in SQUARE_METRES else "-")
     return dataset
 
 
@@ -296,12 +297,14 @@ def read_factors(path: str | os.PathLike[str]) -> StoredFactors:
         ) from None
 
 
-def _text(root: Any, name: str) -> str:
+def text_of(root: Any, name: str) -> str:
+    """An attribute as text, ``missing`` where it is not there."""
     value = root.attrs.get(name, b"missing")
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
-def _array(place: Path, root: Any, name: str, shape: tuple[int, ...], kind: str) -> NDArray[Any]:
+def array_of(place: Path, root: Any, name: str, shape: tuple[int, ...], kind: str) -> NDArray[Any]:
+    """A dataset of this shape and kind of number, whole, or an InputError."""
     import h5py
 
     item = root.get(name)
@@ -315,7 +318,7 @@ def _array(place: Path, root: Any, name: str, shape: tuple[int, ...], kind: str)
 
 
 def _read(place: Path, root: Any) -> StoredFactors:
-    kind, version = _text(root, "format"), root.attrs.get("version")
+    kind, version = text_of(root, "format"), root.attrs.get("version")
     if kind != FORMAT:
         raise InputError(
             f"{place}: root attribute format = {shown(kind)} is not {FORMAT!r}; this HDF5 file "
@@ -327,35 +330,35 @@ def _read(place: Path, root: Any) -> StoredFactors:
             f"{place}: version = {shown(str(version))} of {FORMAT} is not {VERSION}, the one that "
             "this greybed reads; install a newer greybed, or trace the packing again."
         )
-    names = tuple(str(name) for name in json.loads(_text(root, "wall_names")))
+    names = tuple(str(name) for name in json.loads(text_of(root, "wall_names")))
     n = int(root["escaped"].shape[0])
-    indptr = _array(place, root, "factors/indptr", (n + 1,), "i")
+    indptr = array_of(place, root, "factors/indptr", (n + 1,), "i")
     size = int(indptr[-1])
     if indptr[0] != 0 or (np.diff(indptr) < 0).any():
         raise InputError(f"{place}: factors/indptr does not rise from 0; trace the packing again.")
-    indices = _array(place, root, "factors/indices", (size,), "i")
+    indices = array_of(place, root, "factors/indices", (size,), "i")
     if size and not (indices.min() >= 0 and indices.max() < n):
         raise InputError(
             f"{place}: factors/indices exceeds 0 ... {n - 1}; trace the packing again."
         )
-    data = _array(place, root, "factors/data", (size,), "f")
-    errors = _array(place, root, "stderr/data", (size,), "f")
+    data = array_of(place, root, "factors/data", (size,), "f")
+    errors = array_of(place, root, "stderr/data", (size,), "f")
     result = ViewFactors(
         factors=sparse.csr_array((data, indices, indptr), shape=(n, n)),
         stderr=sparse.csr_array((errors, indices, indptr), shape=(n, n)),
-        wall_factors=_array(place, root, "walls/factors", (n, len(names)), "f"),
-        wall_stderr=_array(place, root, "walls/stderr", (n, len(names)), "f"),
-        **{name: _array(place, root, name, (n,), "f") for name in SPHERE_ARRAYS},
+        wall_factors=array_of(place, root, "walls/factors", (n, len(names)), "f"),
+        wall_stderr=array_of(place, root, "walls/stderr", (n, len(names)), "f"),
+        **{name: array_of(place, root, name, (n,), "f") for name in SPHERE_ARRAYS},
         rays=int(root.attrs["rays"]),
         seed=int(root.attrs["seed"]),
         seconds=math.nan,
-        cost=_array(place, root, "cost", (n,), "i"),
+        cost=array_of(place, root, "cost", (n,), "i"),
         reciprocal=bool(root.attrs["reciprocal"]),
     )
     return StoredFactors(
         result,
-        _text(root, "packing"),
+        text_of(root, "packing"),
         names,
         float(root.attrs["max_distance"]),
-        _text(root, "greybed"),
+        text_of(root, "greybed"),
     )

@@ -42,6 +42,8 @@ RAYS_PER_BLOCK = 4_000_000
 # In beds of millions each block costs something for every sphere of the bed.
 RAYS_PER_BLOCK_AND_SPHERE = 10
 MOST_WORKERS = 1024
+# What a block of view factors holds.
+BLOCK_NAMES = ("lengths", "sums", *ENTRY_ARRAYS.values(), *ROW_NAMES)
 # How long a scheduler may take to answer [s].
 PATIENCE = 20.0
 
@@ -59,8 +61,9 @@ class Settings:
 class Kept(Mapping[str, NDArray[Any]]):
     """Arrays of a finished block, read from its file when they are asked for."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, names: tuple[str, ...] = BLOCK_NAMES) -> None:
         self.path = path
+        self.names = names
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         # Opened here, for numpy would leave a damaged file open.
@@ -68,10 +71,10 @@ class Kept(Mapping[str, NDArray[Any]]):
             return np.asarray(stored[name])
 
     def __iter__(self) -> Iterator[str]:
-        return iter(("lengths", "sums", *ENTRY_ARRAYS.values(), *ROW_NAMES))
+        return iter(self.names)
 
     def __len__(self) -> int:
-        return 2 + len(ENTRY_ARRAYS) + len(ROW_NAMES)
+        return len(self.names)
 
     @property
     def whole(self) -> bool:
@@ -191,7 +194,7 @@ def trace_in_blocks(
     size = min(max(max(RAYS_PER_BLOCK, RAYS_PER_BLOCK_AND_SPHERE * n) // rays, 1), n)
     key = json.dumps([__version__, packing_hash(packing), list(vars(settings).values()), size])
     root = Path(folder) / STATE
-    kept = _state(root, hashlib.sha256(key.encode()).hexdigest()[:32])
+    kept = state_folder(root, hashlib.sha256(key.encode()).hexdigest()[:32])
     spans = [(first, min(first + size, n)) for first in range(0, n, size)]
     blocks = [Kept(kept / f"{first}-{last}.npz") for first, last in spans]
     todo = [span for span, block in zip(spans, blocks, strict=True) if not block.whole]
@@ -201,13 +204,18 @@ def trace_in_blocks(
         begin = time.perf_counter()
         with _tracers(packing, settings, threads, count, scheduler) as results:
             for (first, last), arrays in results(todo):
-                with atomic_path(kept / f"{first}-{last}.npz") as part, open(part, "wb") as stream:
-                    np.savez(stream, allow_pickle=False, **arrays)
+                keep(kept / f"{first}-{last}.npz", arrays)
                 advance((last - first) * rays)
     return Traced(packing, tuple(blocks), settings, found, time.perf_counter() - begin, root)
 
 
-def _state(root: Path, key: str) -> Path:
+def keep(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Write the arrays of a finished block, whole or not at all."""
+    with atomic_path(path) as part, open(part, "wb") as stream:
+        np.savez(stream, allow_pickle=False, **arrays)
+
+
+def state_folder(root: Path, key: str) -> Path:
     """The folder of a run's blocks; what other settings have left is of no use to it."""
     for other in root.glob("*"):
         if other.name != key:
@@ -305,6 +313,7 @@ def _rows(
         max_distance=settings.max_distance,
         threads=threads,
         emitters=np.arange(first, last),
+        device=settings.device,
         scene=scene,
     )
     return block_of(result, first, last)

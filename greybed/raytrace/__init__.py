@@ -6,6 +6,7 @@ from greybed.raytrace.exchange_results import (
     ExchangeFactors,
     ExchangeRows,
     ImagePairs,
+    PatchExchange,
     RayShares,
 )
 from greybed.raytrace.firsthits import first_hits
@@ -24,6 +25,7 @@ __all__ = [
     "ExchangeRows",
     "ImagePairs",
     "PairFactors",
+    "PatchExchange",
     "PatchFactors",
     "RadiativeExchangeFactor",
     "RayShares",

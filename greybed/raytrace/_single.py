@@ -7,7 +7,8 @@ from numba import njit
 
 from greybed.raytrace._grid import Grid
 from greybed.raytrace._kernels import ESCAPED, redraw
-from greybed.raytrace._rows import at_limit, march_on, room_for_tasks, slot_for, store
+from greybed.raytrace._rows import at_limit, march_on, slot_for, store
+from greybed.raytrace._scratch import room_for_tasks
 from greybed.raytrace._sobol import sphere_rays
 from greybed.raytrace._streams import GOLDEN, draw, mix, replicate_seeds, stream_of
 from greybed.raytrace._walls import Walls, walls_ahead

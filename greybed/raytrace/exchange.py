@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from greybed.core import InputError, Packing
 from greybed.raytrace import _paths
+from greybed.raytrace.arguments import whole_number
+from greybed.raytrace.exchange_patches import patch_exchange
 from greybed.raytrace.exchange_results import (
     ExchangeFactors,
     ExchangeRows,
     ImagePairs,
+    PatchExchange,
     RayShares,
+    error_of,
+    outside_of,
+    shares_of,
 )
 from greybed.raytrace.follow import Followed, follow_rays
 
@@ -32,6 +40,7 @@ def exchange_factors(
     emitters: ArrayLike | None = None,
     max_distance: float = np.inf,
     images: bool = False,
+    wall_rays: int = 0,
     show_progress: bool = False,
 ) -> ExchangeFactors:
     """Trace exchange (distribution) factors: absorption after any number of reflections.
@@ -66,6 +75,8 @@ def exchange_factors(
         Light that meets nothing within it after start or reflection counts as escaped [m].
     images : bool
         Keep periodic images apart as well, in ``pairs``.
+    wall_rays : int
+        Rays from each wall that ends, too [-]; their rows are ``patches``. None by default.
     show_progress : bool
         Draw a progress bar on standard error.
 
@@ -96,12 +107,28 @@ def exchange_factors(
     n = len(packing)
     sets = _sets(emissivity, n)
     wall_sets = _wall_sets(wall_emissivity, len(sets), packing.n_walls)
+    optics: dict[str, Any] = {
+        "specular": _share(specular, n, "specular"),
+        "wall_specular": _share(wall_specular, packing.n_walls, "wall_specular"),
+    }
+    count = whole_number(wall_rays, "wall_rays", 0)
+    patches: tuple[PatchExchange | None, ...] = (None,) * len(sets)
+    if count:
+        patches = patch_exchange(
+            packing,
+            sets,
+            wall_sets,
+            **optics,
+            rays=count,
+            seed=whole_number(seed, "seed", 0),
+            threads=threads,
+            max_distance=max_distance,
+        )
     done = follow_rays(
         packing,
         sets,
         wall_sets,
-        specular=_share(specular, n, "specular"),
-        wall_specular=_share(wall_specular, packing.n_walls, "wall_specular"),
+        **optics,
         rays=rays,
         seed=seed,
         threads=threads,
@@ -111,7 +138,10 @@ def exchange_factors(
         show_progress=show_progress,
     )
     return ExchangeFactors(
-        tuple(_rows(packing, done, k, sets[k], wall_sets[k], images) for k in range(len(sets)))
+        tuple(
+            _rows(packing, done, k, sets[k], wall_sets[k], images, patches[k])
+            for k in range(len(sets))
+        )
     )
 
 
@@ -171,7 +201,7 @@ def exchange_of_rays(
         free=(o, d / length),
         max_distance=max_distance,
     )
-    return tuple(_shares(done, k, sets[k], wall_sets[k]) for k in range(len(sets)))
+    return tuple(shares_of(done, k, sets[k], wall_sets[k]) for k in range(len(sets)))
 
 
 def _sets(emissivity: ArrayLike | list[ArrayLike], n: int) -> Array:
@@ -227,39 +257,26 @@ def _share(values: ArrayLike, n: int, name: str) -> Array:
     return np.array(np.broadcast_to(array, (n,)))
 
 
-def _error(total: Array, square: Array, unit: ArrayLike, rays: int) -> Array:
-    """Standard error of a mean over rays, after two more hits worth ``unit`` and two misses."""
-    u = np.asarray(unit, dtype=np.float64)
-    mean = (total + 2.0 * u) / (rays + 4.0)
-    spread = (square + 2.0 * u * u) / (rays + 4.0) - mean * mean
-    return np.sqrt(np.maximum(spread, 0.0) / (rays + 4.0))
-
-
-def _outside(done: Followed, k: int, n: int, emissivity: Array) -> tuple[Array, Array]:
-    """Totals and squares of walls and, last, escape, each (n, n_walls + 1)."""
-    n_walls = len(emissivity)
-    total, square = np.zeros((n, n_walls + 1)), np.zeros((n, n_walls + 1))
-    out = done.key < 0
-    column = np.where(done.key[out] == _paths.ESCAPED, n_walls, -1 - done.key[out])
-    total[done.emitter[out], column] = done.total[out, k]
-    square[done.emitter[out], column] = done.square[out, k]
-    return total, square
-
-
 def _rows(
-    packing: Packing, done: Followed, k: int, emissivity: Array, walls: Array, images: bool
+    packing: Packing,
+    done: Followed,
+    k: int,
+    emissivity: Array,
+    walls: Array,
+    images: bool,
+    patches: PatchExchange | None,
 ) -> ExchangeRows:
     n, rays = len(packing), done.rays
     hit = (done.key >= 0) & (done.total[:, k] > 0.0)
     emitter, key = done.emitter[hit], done.key[hit]
     target, image = _paths.split_keys(key) if images else (key, None)
     factor = done.total[hit, k] / rays
-    error = _error(done.total[hit, k], done.square[hit, k], emissivity[target], rays)
+    error = error_of(done.total[hit, k], done.square[hit, k], emissivity[target], rays)
     pairs = None if image is None else ImagePairs(emitter, target, image, factor, error)
     where, shape = (emitter, target), (n, n)
     variance = sparse.coo_array((error**2, where), shape=shape).tocsr()
-    total, square = _outside(done, k, n, walls)
-    outer_error = _error(total, square, np.append(walls, 1.0), rays)
+    total, square = outside_of(done, k, n, walls)
+    outer_error = error_of(total, square, np.append(walls, 1.0), rays)
     untraced = ~np.isfinite(done.buried)
     outer = total / rays
     outer[untraced] = np.nan
@@ -281,25 +298,9 @@ def _rows(
         spread=mean,
         spread_stderr=spread,
         pairs=pairs,
+        patches=patches,
         cut=done.cut / (rays * max(int((~untraced).sum()), 1)),
         rays=rays,
         seed=done.seed,
         seconds=done.seconds,
-    )
-
-
-def _shares(done: Followed, k: int, emissivity: Array, walls: Array) -> RayShares:
-    n, rays = len(emissivity), done.rays
-    total, square = np.zeros(n), np.zeros(n)
-    hit = done.key >= 0
-    total[done.key[hit]], square[done.key[hit]] = done.total[hit, k], done.square[hit, k]
-    outer, outer_square = (v[0] for v in _outside(done, k, 1, walls))
-    outer_error = _error(outer, outer_square, np.append(walls, 1.0), rays)
-    return RayShares(
-        factors=total / rays,
-        stderr=_error(total, square, emissivity, rays),
-        wall_factors=outer[:-1] / rays,
-        wall_stderr=outer_error[:-1],
-        escaped=float(outer[-1]) / rays,
-        escaped_stderr=float(outer_error[-1]),
     )

@@ -6,8 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
+
+from greybed.raytrace import _paths
+from greybed.raytrace.follow import Followed
 
 Array = NDArray[np.float64]
 
@@ -34,6 +37,51 @@ class ImagePairs:
 
 
 @dataclass(frozen=True, eq=False)
+class PatchExchange:
+    """Exchange factors of the walls at one emissivity: what a wall emits, by who absorbs it.
+
+    Attributes
+    ----------
+    factors, stderr : csr_array, shape (n_walls, n)
+        Wall to sphere and standard error [-]; rows of walls without end are empty.
+    wall_factors, wall_stderr : ndarray, shape (n_walls, n_walls)
+        Wall to wall [-]; NaN in rows of walls without end.
+    escaped, escaped_stderr : ndarray, shape (n_walls,)
+        Share that leaves for good [-].
+    emissivity : ndarray, shape (n_walls,)
+        Of the walls [-].
+    areas, buried : ndarray, shape (n_walls,)
+        Surface on the bed's side, less what lies inside spheres [m2], infinite without end, and
+        the share inside spheres [-]. ``A_w e_w D_wi = A_i e_i D_iw`` holds within the errors.
+    rays : int
+        Rays started from each wall [-].
+    """
+
+    factors: sparse.csr_array
+    stderr: sparse.csr_array
+    wall_factors: Array
+    wall_stderr: Array
+    escaped: Array
+    escaped_stderr: Array
+    emissivity: Array
+    areas: Array
+    buried: Array
+    rays: int
+
+    @property
+    def exchange(self) -> Array:
+        """Exchange areas between walls, A e D, (n_walls, n_walls) [m2], the mean of both ways.
+
+        Where one of two walls has no end, what the other one sends; zero where both have none.
+        """
+        sent = self.areas[:, None] * self.emissivity[:, None] * self.wall_factors
+        known = np.isfinite(sent)
+        sent = np.where(known, sent, 0.0)
+        ways = known.astype(np.float64)
+        return (sent + sent.T) / np.maximum(ways + ways.T, 1.0)
+
+
+@dataclass(frozen=True, eq=False)
 class ExchangeRows:
     """Exchange factors D_ij at one emissivity: the share of what i emits that j finally absorbs.
 
@@ -56,6 +104,8 @@ class ExchangeRows:
         sum_j D_ij (x_ij^2, y_ij^2, z_ij^2, d_ij^2) over spheres and images [m2].
     pairs : ImagePairs or None
         Where images were asked for.
+    patches : PatchExchange or None
+        Rows of the walls, where ``wall_rays`` were asked for.
     cut : float
         Share of the paths that were cut short [-].
     rays, seed : int
@@ -77,6 +127,7 @@ class ExchangeRows:
     spread: Array
     spread_stderr: Array
     pairs: ImagePairs | None
+    patches: PatchExchange | None
     cut: float
     rays: int
     seed: int
@@ -86,6 +137,11 @@ class ExchangeRows:
     def emission_areas(self) -> Array:
         """Areas times emissivity, (n,) [m2]: ``E_i D_ij = E_j D_ji`` holds within the errors."""
         return self.areas * self.emissivity
+
+    @property
+    def wall_exchange(self) -> Array | None:
+        """Exchange areas between the walls, (n_walls, n_walls) [m2]; None without ``patches``."""
+        return None if self.patches is None else self.patches.exchange
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,3 +186,40 @@ class RayShares:
     wall_stderr: Array
     escaped: float
     escaped_stderr: float
+
+
+def error_of(total: Array, square: Array, unit: ArrayLike, rays: int) -> Array:
+    """Standard error of a mean over rays, after two more hits worth ``unit`` and two misses."""
+    u = np.asarray(unit, dtype=np.float64)
+    mean = (total + 2.0 * u) / (rays + 4.0)
+    spread = (square + 2.0 * u * u) / (rays + 4.0) - mean * mean
+    return np.sqrt(np.maximum(spread, 0.0) / (rays + 4.0))
+
+
+def outside_of(done: Followed, k: int, n: int, emissivity: Array) -> tuple[Array, Array]:
+    """Totals and squares of walls and, last, escape, each (n, n_walls + 1)."""
+    n_walls = len(emissivity)
+    total, square = np.zeros((n, n_walls + 1)), np.zeros((n, n_walls + 1))
+    out = done.key < 0
+    column = np.where(done.key[out] == _paths.ESCAPED, n_walls, -1 - done.key[out])
+    total[done.emitter[out], column] = done.total[out, k]
+    square[done.emitter[out], column] = done.square[out, k]
+    return total, square
+
+
+def shares_of(done: Followed, k: int, emissivity: Array, walls: Array) -> RayShares:
+    """Where the energy of the rays went, at emissivities number ``k``."""
+    n, rays = len(emissivity), done.rays
+    total, square = np.zeros(n), np.zeros(n)
+    hit = done.key >= 0
+    total[done.key[hit]], square[done.key[hit]] = done.total[hit, k], done.square[hit, k]
+    outer, outer_square = (v[0] for v in outside_of(done, k, 1, walls))
+    outer_error = error_of(outer, outer_square, np.append(walls, 1.0), rays)
+    return RayShares(
+        factors=total / rays,
+        stderr=error_of(total, square, emissivity, rays),
+        wall_factors=outer[:-1] / rays,
+        wall_stderr=outer_error[:-1],
+        escaped=float(outer[-1]) / rays,
+        escaped_stderr=float(outer_error[-1]),
+    )

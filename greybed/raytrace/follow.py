@@ -77,6 +77,7 @@ def follow_rays(
     max_distance: float = np.inf,
     images: bool = False,
     show_progress: bool = False,
+    scene: Scene | None = None,
 ) -> Followed:
     """Follow ``rays`` paths from each emitter, or those of ``free`` (origins, directions).
 
@@ -100,7 +101,7 @@ def follow_rays(
     if who[0] < 0 or who[-1] >= n:
         raise InputError(f"emitters must lie in 0 ... {n - 1}; got {who[0]} ... {who[-1]}.")
     begin = time.perf_counter()
-    scene = Scene.of(packing).tables
+    tables = (Scene.of(packing) if scene is None else scene).tables
     origins, directions = (np.empty((0, 3)), np.empty((0, 3))) if free is None else free
     optics = (
         np.ascontiguousarray(emissivity.T), specular,
@@ -119,8 +120,8 @@ def follow_rays(
             used, *found = _table(size, len(emissivity))
             keys, stamp, total, square, slots, moments, extra = found
             used = _paths.follow(
-                *task, seed, scene.centres, scene.radii, scene.exposed, origins, directions,
-                images, scene.grid, scene.walls, normals, max_distance, *optics,
+                *task, seed, tables.centres, tables.radii, tables.exposed, origins, directions,
+                images, tables.grid, tables.walls, normals, max_distance, *optics,
                 keys, stamp, np.empty_like(total), total, square, slots, moments, extra,
             )  # fmt: skip
             if used == _paths.BURIED:

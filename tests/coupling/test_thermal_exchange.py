@@ -87,6 +87,14 @@ heat = "adiabatic"
     np.testing.assert_allclose(
         result.temperatures, radiative_network(grey, **ask).temperatures, rtol=1e-8
     )
+    dull = text.replace("temperature = 900.0", "temperature = 900.0\nemissivity = 0.4")
+    (tmp_path / "dull.toml").write_text(dull)
+    less = view_factors(load_case(tmp_path / "dull.toml"), bed)
+    (direct,) = exchange_factors(bed, 0.5, rays=2000, wall_emissivity=[0.4, 1.0, 0.0])
+    np.testing.assert_array_equal(less.wall_factors, direct.wall_factors)
+    (tmp_path / "odd.toml").write_text(dull.replace(", reflections = true", ""))
+    with pytest.raises(InputError, match=r"'hot': emissivity = 0.4 .*radiation.reflections = true"):
+        load_case(tmp_path / "odd.toml")
     (tmp_path / "odd.toml").write_text(
         text.replace('source = "traced", rays = 2000', 'source = "off"')
     )
