@@ -29,21 +29,15 @@ def cells_of(place, low, inverse, shape, cell):
 
 
 @njit(**_OPTIONS)
-def near_order(cell, shape, order):
-    """Order of particles by cells along Morton's curve: what is near in space is near in memory.
-
-    Equal cells keep their order, so that equal states give equal orders.
-    """
-    n = cell.size
-    key = np.empty(n, np.int64)
-    for i in range(n):
+def morton_keys(cell, shape, key):
+    """Numbers of the cells along Morton's curve: what is near in space is near in memory."""
+    for i in range(cell.size):
         z = cell[i] % shape[2]
         y = cell[i] // shape[2] % shape[1]
         x = cell[i] // (shape[2] * shape[1])
         key[i] = (_spread(x) << 2) | (_spread(y) << 1) | _spread(z)
         # Beds wider than 1024 cells repeat the curve.
         key[i] |= ((x >> 10) * 1009 + (y >> 10) * 31 + (z >> 10)) << 30
-    order[:] = np.argsort(key, kind="mergesort")
 
 
 @njit(**_OPTIONS)

@@ -5,11 +5,9 @@ import math
 import numpy as np
 from numba import njit
 
-from greybed.dem._batch import (
-    ARM_I, ARM_J, BX, BY, BZ, COLUMNS, DEEP, EPSD, FX, FY, FZ, IX, IY, IZ, JX, JY, JZ, MI, MJ,
-    NO_ROLLING, NX, NY, NZ, OVERLAP, PLASTIC, RI, RJ, RX, RY, RZ, SIZE, SJKR, SX, SY, SZ, TWIST,
-    TX, TY, TZ, UX, UY, UZ, VAN_DER_WAALS, attraction, pair_extras, pair_geometry, room, solve,
-)  # fmt: skip
+from greybed.dem import _columns as col
+from greybed.dem._batch import pair_extras, pair_geometry, room, solve
+from greybed.dem._cohesion import attraction
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
@@ -28,14 +26,18 @@ def block_forces(
     work, who = room(table)
     # Flat: a row's begin is then a constant, while numba multiplies by strides at each access.
     flat, at = work.reshape(-1), place.reshape(-1)
-    filled = 0
+    filled = np.int64(0)
     count[0], count[1], count[2] = 0.0, 0.0, -1.0
     columns = history.shape[1]
     for i in range(begin, end):
         x, y, z, r = at[4 * i], at[4 * i + 1], at[4 * i + 2], at[4 * i + 3]
         for k in range(first[i], first[i + 1]):
             j = np.int64(partner[np.uint64(k)])
-            dx, dy, dz = x - at[np.uint64(4 * j)], y - at[np.uint64(4 * j + 1)], z - at[np.uint64(4 * j + 2)]
+            dx, dy, dz = (
+                x - at[np.uint64(4 * j)],
+                y - at[np.uint64(4 * j + 1)],
+                z - at[np.uint64(4 * j + 2)],
+            )
             if periodic:
                 code = np.int64(shift[np.uint64(k)])
                 dx -= (code // 9 - 1) * edge[0]
@@ -46,10 +48,10 @@ def block_forces(
             hit = square < both * both
             # Written whether they touch or not: whether they do is a guess that costs more.
             c = np.uint64(filled)
-            who[c], who[c + np.uint64(SIZE)], who[c + np.uint64(2 * SIZE)] = i, j, k
-            flat[np.uint64(NX * SIZE) + c] = dx
-            flat[np.uint64(NY * SIZE) + c] = dy
-            flat[np.uint64(NZ * SIZE) + c] = dz
+            who[c], who[c + np.uint64(col.SIZE)], who[c + np.uint64(2 * col.SIZE)] = i, j, k
+            flat[np.uint64(col.NX * col.SIZE) + c] = dx
+            flat[np.uint64(col.NY * col.SIZE) + c] = dy
+            flat[np.uint64(col.NZ * col.SIZE) + c] = dz
             filled += hit
             if touch[np.uint64(k)] != hit:
                 touch[k] = hit
@@ -59,13 +61,13 @@ def block_forces(
                     if slot[k] >= 0:
                         for m in range(6):
                             crossing[slot[k], m] = 0.0
-            if cohesion == VAN_DER_WAALS and not hit:
+            if cohesion == col.VAN_DER_WAALS and not hit:
                 _attract(i, j, k, dx, dy, dz, square, r, at[4 * j + 3], table,
                          row[kind[i], kind[j]], load, slot, crossing)  # fmt: skip
-            if filled == SIZE:
+            if filled == col.SIZE:
                 _settle(work, who, filled, place, motion, load, kind, history, slot, crossing, row,
                         table, dt, normal, rolling, cohesion, limit, count)  # fmt: skip
-                filled = 0
+                filled = np.int64(0)
     if filled:
         _settle(work, who, filled, place, motion, load, kind, history, slot, crossing, row, table,
                 dt, normal, rolling, cohesion, limit, count)  # fmt: skip
@@ -99,89 +101,89 @@ def _settle(
         history.reshape(-1), history.shape[1], row, table,
     )  # fmt: skip
     pair_geometry(work, n)
-    if cohesion == SJKR or rolling == EPSD:
+    if cohesion == col.SJKR or rolling == col.EPSD:
         pair_extras(work, n)
     solve(work, n, dt, normal, rolling, cohesion, limit)
     _carry_out(
         work.reshape(-1), who, n, load.reshape(-1), history.reshape(-1), history.shape[1], slot,
-        crossing.reshape(-1), rolling != NO_ROLLING,
+        crossing.reshape(-1), rolling != col.NO_ROLLING,
     )  # fmt: skip
     count[0] += n
     for c in range(n):
-        deep = work[OVERLAP, c] / min(work[RI, c], work[RJ, c])
+        deep = work[col.OVERLAP, c] / min(work[col.RI, c], work[col.RJ, c])
         if deep > count[1]:
-            count[1], count[2] = deep, who[2 * SIZE + c]
+            count[1], count[2] = deep, who[2 * col.SIZE + c]
 
 
 @njit(**_OPTIONS)
 def _bring_in(work, who, n, place, motion, kind, history, columns, row, table):
     one = table.shape[0] == 1
     for c in range(n):
-        i, j, k = who[c], who[c + SIZE], who[c + 2 * SIZE]
+        i, j, k = who[c], who[c + col.SIZE], who[c + 2 * col.SIZE]
         a, b, h = np.uint64(8 * i), np.uint64(8 * j), np.uint64(columns * k)
         c = np.uint64(c)
-        work[np.uint64(RI * SIZE) + c] = place[np.uint64(4 * i + 3)]
-        work[np.uint64(RJ * SIZE) + c] = place[np.uint64(4 * j + 3)]
-        work[np.uint64(UX * SIZE) + c] = motion[a] - motion[b]
-        work[np.uint64(UY * SIZE) + c] = motion[a + np.uint64(1)] - motion[b + np.uint64(1)]
-        work[np.uint64(UZ * SIZE) + c] = motion[a + np.uint64(2)] - motion[b + np.uint64(2)]
-        work[np.uint64(IX * SIZE) + c] = motion[a + np.uint64(3)]
-        work[np.uint64(IY * SIZE) + c] = motion[a + np.uint64(4)]
-        work[np.uint64(IZ * SIZE) + c] = motion[a + np.uint64(5)]
-        work[np.uint64(MI * SIZE) + c] = motion[a + np.uint64(6)]
-        work[np.uint64(JX * SIZE) + c] = motion[b + np.uint64(3)]
-        work[np.uint64(JY * SIZE) + c] = motion[b + np.uint64(4)]
-        work[np.uint64(JZ * SIZE) + c] = motion[b + np.uint64(5)]
-        work[np.uint64(MJ * SIZE) + c] = motion[b + np.uint64(6)]
-        work[np.uint64(SX * SIZE) + c] = history[h]
-        work[np.uint64(SY * SIZE) + c] = history[h + np.uint64(1)]
-        work[np.uint64(SZ * SIZE) + c] = history[h + np.uint64(2)]
-        if columns > TWIST:
-            work[np.uint64(TX * SIZE) + c] = history[h + np.uint64(3)]
-            work[np.uint64(TY * SIZE) + c] = history[h + np.uint64(4)]
-            work[np.uint64(TZ * SIZE) + c] = history[h + np.uint64(5)]
-        if columns > PLASTIC:
-            work[np.uint64(DEEP * SIZE) + c] = history[h + np.uint64(6)]
+        work[np.uint64(col.RI * col.SIZE) + c] = place[np.uint64(4 * i + 3)]
+        work[np.uint64(col.RJ * col.SIZE) + c] = place[np.uint64(4 * j + 3)]
+        work[np.uint64(col.UX * col.SIZE) + c] = motion[a] - motion[b]
+        work[np.uint64(col.UY * col.SIZE) + c] = motion[a + np.uint64(1)] - motion[b + np.uint64(1)]
+        work[np.uint64(col.UZ * col.SIZE) + c] = motion[a + np.uint64(2)] - motion[b + np.uint64(2)]
+        work[np.uint64(col.IX * col.SIZE) + c] = motion[a + np.uint64(3)]
+        work[np.uint64(col.IY * col.SIZE) + c] = motion[a + np.uint64(4)]
+        work[np.uint64(col.IZ * col.SIZE) + c] = motion[a + np.uint64(5)]
+        work[np.uint64(col.MI * col.SIZE) + c] = motion[a + np.uint64(6)]
+        work[np.uint64(col.JX * col.SIZE) + c] = motion[b + np.uint64(3)]
+        work[np.uint64(col.JY * col.SIZE) + c] = motion[b + np.uint64(4)]
+        work[np.uint64(col.JZ * col.SIZE) + c] = motion[b + np.uint64(5)]
+        work[np.uint64(col.MJ * col.SIZE) + c] = motion[b + np.uint64(6)]
+        work[np.uint64(col.SX * col.SIZE) + c] = history[h]
+        work[np.uint64(col.SY * col.SIZE) + c] = history[h + np.uint64(1)]
+        work[np.uint64(col.SZ * col.SIZE) + c] = history[h + np.uint64(2)]
+        if columns > col.TWIST:
+            work[np.uint64(col.TX * col.SIZE) + c] = history[h + np.uint64(3)]
+            work[np.uint64(col.TY * col.SIZE) + c] = history[h + np.uint64(4)]
+            work[np.uint64(col.TZ * col.SIZE) + c] = history[h + np.uint64(5)]
+        if columns > col.PLASTIC:
+            work[np.uint64(col.DEEP * col.SIZE) + c] = history[h + np.uint64(6)]
         if not one:
             p = row[kind[i], kind[j]]
-            for column in range(COLUMNS):
-                work[np.uint64(column * SIZE) + c] = table[p, column]
+            for column in range(col.COLUMNS):
+                work[np.uint64(column * col.SIZE) + c] = table[p, column]
 
 
 @njit(**_OPTIONS)
 def _carry_out(work, who, n, load, history, columns, slot, crossing, rolls):
     for c in range(n):
-        i, j, k = who[c], who[c + SIZE], who[c + 2 * SIZE]
+        i, j, k = who[c], who[c + col.SIZE], who[c + 2 * col.SIZE]
         h = np.uint64(columns * k)
         ahead = slot[np.uint64(k)]
         c = np.uint64(c)
-        history[h] = work[np.uint64(SX * SIZE) + c]
-        history[h + np.uint64(1)] = work[np.uint64(SY * SIZE) + c]
-        history[h + np.uint64(2)] = work[np.uint64(SZ * SIZE) + c]
-        if columns > TWIST:
-            history[h + np.uint64(3)] = work[np.uint64(TX * SIZE) + c]
-            history[h + np.uint64(4)] = work[np.uint64(TY * SIZE) + c]
-            history[h + np.uint64(5)] = work[np.uint64(TZ * SIZE) + c]
-        if columns > PLASTIC:
-            history[h + np.uint64(6)] = work[np.uint64(DEEP * SIZE) + c]
+        history[h] = work[np.uint64(col.SX * col.SIZE) + c]
+        history[h + np.uint64(1)] = work[np.uint64(col.SY * col.SIZE) + c]
+        history[h + np.uint64(2)] = work[np.uint64(col.SZ * col.SIZE) + c]
+        if columns > col.TWIST:
+            history[h + np.uint64(3)] = work[np.uint64(col.TX * col.SIZE) + c]
+            history[h + np.uint64(4)] = work[np.uint64(col.TY * col.SIZE) + c]
+            history[h + np.uint64(5)] = work[np.uint64(col.TZ * col.SIZE) + c]
+        if columns > col.PLASTIC:
+            history[h + np.uint64(6)] = work[np.uint64(col.DEEP * col.SIZE) + c]
         fx, fy, fz = (
-            work[np.uint64(FX * SIZE) + c],
-            work[np.uint64(FY * SIZE) + c],
-            work[np.uint64(FZ * SIZE) + c],
+            work[np.uint64(col.FX * col.SIZE) + c],
+            work[np.uint64(col.FY * col.SIZE) + c],
+            work[np.uint64(col.FZ * col.SIZE) + c],
         )
         bx, by, bz = (
-            work[np.uint64(BX * SIZE) + c],
-            work[np.uint64(BY * SIZE) + c],
-            work[np.uint64(BZ * SIZE) + c],
+            work[np.uint64(col.BX * col.SIZE) + c],
+            work[np.uint64(col.BY * col.SIZE) + c],
+            work[np.uint64(col.BZ * col.SIZE) + c],
         )
         tx, ty, tz = 0.0, 0.0, 0.0
         if rolls:
             tx, ty, tz = (
-                work[np.uint64(RX * SIZE) + c],
-                work[np.uint64(RY * SIZE) + c],
-                work[np.uint64(RZ * SIZE) + c],
+                work[np.uint64(col.RX * col.SIZE) + c],
+                work[np.uint64(col.RY * col.SIZE) + c],
+                work[np.uint64(col.RZ * col.SIZE) + c],
             )
-        a, b = work[np.uint64(ARM_I * SIZE) + c], work[np.uint64(ARM_J * SIZE) + c]
+        a, b = work[np.uint64(col.ARM_I * col.SIZE) + c], work[np.uint64(col.ARM_J * col.SIZE) + c]
         m = np.uint64(8 * i)
         load[m] += fx
         load[m + np.uint64(1)] += fy

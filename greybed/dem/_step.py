@@ -95,7 +95,11 @@ def _kick_and_drift(begin, end, state, near, push, dt, finish, start, worst):
             bx = spin * load[m + np.uint64(3)]
             by = spin * load[m + np.uint64(4)]
             bz = spin * load[m + np.uint64(5)]
-            wx, wy, wz = motion[m + np.uint64(3)], motion[m + np.uint64(4)], motion[m + np.uint64(5)]
+            wx, wy, wz = (
+                motion[m + np.uint64(3)],
+                motion[m + np.uint64(4)],
+                motion[m + np.uint64(5)],
+            )
             # Twice half a kick, not once a whole one: a run in two parts ends with the same bits.
             for _ in range(halves):
                 vx, vy, vz = vx + ax, vy + ay, vz + az
@@ -135,7 +139,9 @@ def _kicks_of_blocks(state, near, push, dt, finish, start, worst):
 def _kicks(state, near, push, dt, finish, start, worst):
     # To wake threads for a single block takes longer than its step.
     if near.block.size == 2:
-        _kick_and_drift(0, near.block[1], state, near, push, dt, finish, start, worst[0])
+        _kick_and_drift(
+            near.block[0], near.block[1], state, near, push, dt, finish, start, worst[0]
+        )
     else:
         _kicks_of_blocks(state, near, push, dt, finish, start, worst)
 
@@ -163,14 +169,15 @@ def _forces_of_block(b, state, near, surfaces, law, edge, periodic, dt, count):
 @njit(parallel=True, **_OPTIONS)
 def _forces_of_blocks(state, near, surfaces, law, edge, periodic, dt, count):
     for b in prange(near.block.size - 1):
-        _forces_of_block(b, state, near, surfaces, law, edge, periodic, dt, count[b])
+        _forces_of_block(np.int64(b), state, near, surfaces, law, edge, periodic, dt, count[b])
 
 
+# Numbers with a type of their own, not literals: each literal would be compiled once more.
 @njit(**_OPTIONS)
 def forces(state, near, surfaces, law, edge, periodic, dt, count):
     """Forces of the present places; those across blocks wait in ``near.crossing``."""
     if near.block.size == 2:
-        _forces_of_block(0, state, near, surfaces, law, edge, periodic, dt, count[0])
+        _forces_of_block(np.int64(0), state, near, surfaces, law, edge, periodic, dt, count[0])
     else:
         _forces_of_blocks(state, near, surfaces, law, edge, periodic, dt, count)
 
@@ -187,7 +194,7 @@ def advance(
     """
     blocks = near.block.size - 1
     for step in range(steps):
-        _kicks(state, near, push, dt, 1 if pending else 0, 1, worst)
+        _kicks(state, near, push, dt, np.int64(pending), np.int64(1), worst)
         pending = True
         largest, who = 0.0, -1
         for b in range(blocks):
@@ -219,5 +226,5 @@ def gather(state, near):
 @njit(**_OPTIONS)
 def finish(state, near, push, dt, worst):
     """The second half of the last step's kick."""
-    _kicks(state, near, push, dt, 1, 0, worst)
+    _kicks(state, near, push, dt, np.int64(1), np.int64(0), worst)
     near.crossing[:, :] = 0.0

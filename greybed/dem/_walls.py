@@ -5,10 +5,9 @@ import math
 import numpy as np
 from numba import njit
 
-from greybed.dem._batch import (
-    AREA, ARM_I, ARM_J, BX, BY, BZ, COLUMNS, FX, FY, FZ, INERTIA, IX, IY, IZ, JX, JY, JZ,
-    M_EFF, NO_ROLLING, NX, NY, NZ, OVERLAP, R_EFF, RX, RY, RZ, SIZE, SX, UX, UY, UZ, VAN_DER_WAALS, attraction, room, solve,
-)  # fmt: skip
+from greybed.dem import _columns as col
+from greybed.dem._batch import room, solve
+from greybed.dem._cohesion import attraction
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
@@ -220,7 +219,7 @@ def wall_forces(
     """
     work, who = room(table)
     one = table.shape[0] == 1
-    filled = 0
+    filled = np.int64(0)
     seen = np.empty((MOST_AT_ONCE, 7))
     met = np.empty(MOST_AT_ONCE, np.int64)
     for i in range(begin, end):
@@ -244,7 +243,7 @@ def wall_forces(
                     if touch[k]:
                         touch[k] = 0
                         forget(history, k)
-                    if cohesion == VAN_DER_WAALS:
+                    if cohesion == col.VAN_DER_WAALS:
                         pull = attraction(-overlap, r, table, p)
                         load[i, 0] -= pull * nx
                         load[i, 1] -= pull * ny
@@ -268,28 +267,39 @@ def wall_forces(
                     number += 1
                 m = wall_motion[w]
                 c = filled
-                who[c], who[c + SIZE], who[c + 2 * SIZE] = i, w, k
-                work[NX, c], work[NY, c], work[NZ, c], work[OVERLAP, c] = nx, ny, nz, overlap
+                who[c], who[c + col.SIZE], who[c + 2 * col.SIZE] = i, w, k
+                work[col.NX, c], work[col.NY, c], work[col.NZ, c], work[col.OVERLAP, c] = (
+                    nx,
+                    ny,
+                    nz,
+                    overlap,
+                )
                 # Velocity relative to the wall at the contact.
                 lx, ly, lz = qx - m[6], qy - m[7], qz - m[8]
-                work[UX, c] = motion[i, 0] - (m[0] + m[4] * lz - m[5] * ly)
-                work[UY, c] = motion[i, 1] - (m[1] + m[5] * lx - m[3] * lz)
-                work[UZ, c] = motion[i, 2] - (m[2] + m[3] * ly - m[4] * lx)
-                work[IX, c], work[IY, c], work[IZ, c] = motion[i, 3], motion[i, 4], motion[i, 5]
-                work[JX, c], work[JY, c], work[JZ, c] = m[3], m[4], m[5]
-                work[R_EFF, c], work[M_EFF, c], work[INERTIA, c] = r, mass, mass * r * r
-                work[ARM_I, c], work[ARM_J, c] = r - 0.5 * overlap, 0.0
-                work[AREA, c] = math.pi * (r * r - distance * distance)
+                work[col.UX, c] = motion[i, 0] - (m[0] + m[4] * lz - m[5] * ly)
+                work[col.UY, c] = motion[i, 1] - (m[1] + m[5] * lx - m[3] * lz)
+                work[col.UZ, c] = motion[i, 2] - (m[2] + m[3] * ly - m[4] * lx)
+                work[col.IX, c], work[col.IY, c], work[col.IZ, c] = (
+                    motion[i, 3],
+                    motion[i, 4],
+                    motion[i, 5],
+                )
+                work[col.JX, c], work[col.JY, c], work[col.JZ, c] = m[3], m[4], m[5]
+                work[col.R_EFF, c], work[col.M_EFF, c], work[col.INERTIA, c] = r, mass, mass * r * r
+                work[col.ARM_I, c], work[col.ARM_J, c] = r - 0.5 * overlap, 0.0
+                work[col.AREA, c] = math.pi * (r * r - distance * distance)
                 for column in range(history.shape[1]):
-                    work[SX + column, c] = history[k, column]
+                    work[col.SX + column, c] = history[k, column]
                 if not one:
-                    for column in range(COLUMNS):
+                    for column in range(col.COLUMNS):
                         work[column, c] = table[p, column]
                 filled += 1
-                if filled == SIZE:
+                if filled == col.SIZE:
                     solve(work, filled, dt, normal, rolling, cohesion, limit)
-                    _carry_out(work, who, filled, place, load, history, wall_motion, rolling, on_wall)
-                    filled = 0
+                    _carry_out(
+                        work, who, filled, place, load, history, wall_motion, rolling, on_wall
+                    )
+                    filled = np.int64(0)
     if filled:
         solve(work, filled, dt, normal, rolling, cohesion, limit)
         _carry_out(work, who, filled, place, load, history, wall_motion, rolling, on_wall)
@@ -299,24 +309,24 @@ def wall_forces(
 def _carry_out(work, who, n, place, load, history, wall_motion, rolling, on_wall):
     """Forces of a batch, on particles and walls."""
     for c in range(n):
-        i, w, k = who[c], who[c + SIZE], who[c + 2 * SIZE]
+        i, w, k = who[c], who[c + col.SIZE], who[c + 2 * col.SIZE]
         for column in range(history.shape[1]):
-            history[k, column] = work[SX + column, c]
-        fx, fy, fz = work[FX, c], work[FY, c], work[FZ, c]
+            history[k, column] = work[col.SX + column, c]
+        fx, fy, fz = work[col.FX, c], work[col.FY, c], work[col.FZ, c]
         tx, ty, tz = 0.0, 0.0, 0.0
-        if rolling != NO_ROLLING:
-            tx, ty, tz = work[RX, c], work[RY, c], work[RZ, c]
-        arm = work[ARM_I, c]
+        if rolling != col.NO_ROLLING:
+            tx, ty, tz = work[col.RX, c], work[col.RY, c], work[col.RZ, c]
+        arm = work[col.ARM_I, c]
         load[i, 0] += fx
         load[i, 1] += fy
         load[i, 2] += fz
-        load[i, 3] -= arm * work[BX, c] + tx
-        load[i, 4] -= arm * work[BY, c] + ty
-        load[i, 5] -= arm * work[BZ, c] + tz
-        away = place[i, 3] - work[OVERLAP, c]
-        lx = place[i, 0] - away * work[NX, c] - wall_motion[w, 6]
-        ly = place[i, 1] - away * work[NY, c] - wall_motion[w, 7]
-        lz = place[i, 2] - away * work[NZ, c] - wall_motion[w, 8]
+        load[i, 3] -= arm * work[col.BX, c] + tx
+        load[i, 4] -= arm * work[col.BY, c] + ty
+        load[i, 5] -= arm * work[col.BZ, c] + tz
+        away = place[i, 3] - work[col.OVERLAP, c]
+        lx = place[i, 0] - away * work[col.NX, c] - wall_motion[w, 6]
+        ly = place[i, 1] - away * work[col.NY, c] - wall_motion[w, 7]
+        lz = place[i, 2] - away * work[col.NZ, c] - wall_motion[w, 8]
         on_wall[w, 0] -= fx
         on_wall[w, 1] -= fy
         on_wall[w, 2] -= fz

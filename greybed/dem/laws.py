@@ -5,24 +5,24 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from greybed.core.errors import InputError
-from greybed.dem import _batch
+from greybed.dem import _columns
 
 NORMAL = {
-    "linear": _batch.LINEAR,
-    "hertz": _batch.HERTZ,
-    "hysteresis": _batch.HYSTERESIS,
+    "linear": _columns.LINEAR,
+    "hertz": _columns.HERTZ,
+    "hysteresis": _columns.HYSTERESIS,
 }
 ROLLING = {
-    "none": _batch.NO_ROLLING,
-    "constant-torque": _batch.CONSTANT_TORQUE,
-    "epsd": _batch.EPSD,
-    "epsd-modified": _batch.EPSD_MODIFIED,
+    "none": _columns.NO_ROLLING,
+    "constant-torque": _columns.CONSTANT_TORQUE,
+    "epsd": _columns.EPSD,
+    "epsd-modified": _columns.EPSD_MODIFIED,
 }
 COHESION = {
-    "none": _batch.NO_COHESION,
-    "sjkr": _batch.SJKR,
-    "dmt": _batch.DMT,
-    "van-der-waals": _batch.VAN_DER_WAALS,
+    "none": _columns.NO_COHESION,
+    "sjkr": _columns.SJKR,
+    "dmt": _columns.DMT,
+    "van-der-waals": _columns.VAN_DER_WAALS,
 }
 
 
@@ -56,7 +56,8 @@ class ContactLaw:
     .. [2] Cundall & Strack, Geotechnique 29 (1979) 47, doi 10.1680/geot.1979.29.1.47.
     .. [3] Walton & Braun, J. Rheol. 30 (1986) 949, doi 10.1122/1.549893.
     .. [4] Ai, Chen, Rotter & Ooi, Powder Technol. 206 (2011) 269, doi 10.1016/j.powtec.2010.09.030.
-    .. [5] Iwashita & Oda, J. Eng. Mech. 124 (1998) 285, doi 10.1061/(ASCE)0733-9399(1998)124:3(285).
+    .. [5] Iwashita & Oda, J. Eng. Mech. 124 (1998) 285,
+       doi 10.1061/(ASCE)0733-9399(1998)124:3(285).
     .. [6] Derjaguin, Muller & Toporov, J. Colloid Interface Sci. 53 (1975) 314.
     .. [7] Hamaker, Physica 4 (1937) 1058, doi 10.1016/S0031-8914(37)80203-7.
     """

@@ -89,8 +89,8 @@ class Lists:
         for axis in np.flatnonzero(self.periodic):
             if edge[axis] < 3.0 * cell:
                 raise InputError(
-                    f"the box is {edge[axis]:g} [m] long along {'xyz'[axis]}, less than three times "
-                    f"the largest diameter and the skin, {3.0 * cell:g}; take a longer one."
+                    f"the box is {edge[axis]:g} [m] long along {'xyz'[axis]}, less than three "
+                    f"times the largest diameter and the skin, {3.0 * cell:g}; take a longer one."
                 )
         return given
 
@@ -122,9 +122,11 @@ class Lists:
             _neighbours.wrap(place, self.box[0], self.edge, self.periodic)
         n = len(place)
         low, inverse, shape = self._grid(place)
-        cell, order = np.empty(n, np.int64), np.empty(n, np.int64)
+        cell, key = np.empty(n, np.int64), np.empty(n, np.int64)
         _neighbours.cells_of(place, low, inverse, shape, cell)
-        _neighbours.near_order(cell, shape, order)
+        _neighbours.morton_keys(cell, shape, key)
+        # Equal cells keep their order, so that equal states give equal orders.
+        order = np.argsort(key, kind="stable")
         self.ident = self.ident[order]
         place, cell = place[order], cell[order]
         self.state = _step.State(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from greybed.core.errors import InputError
-from greybed.dem import _batch
+from greybed.dem import _columns
 from greybed.dem.damping import damping
 from greybed.dem.laws import ContactLaw
 
@@ -185,28 +185,28 @@ def pair_tables(
 
 
 def _row(a: Material, b: Material, contact: Contact, law: ContactLaw) -> Array:
-    row = np.zeros(_batch.COLUMNS)
+    row = np.zeros(_columns.COLUMNS)
     if law.normal == "hertz":
-        row[_batch.MODULUS] = 1.0 / sum(
+        row[_columns.MODULUS] = 1.0 / sum(
             (1.0 - m.poissons_ratio**2) / m.youngs_modulus for m in (a, b)
         )
-        row[_batch.SHEAR] = 1.0 / sum((2.0 - m.poissons_ratio) / m.shear_modulus for m in (a, b))
+        row[_columns.SHEAR] = 1.0 / sum((2.0 - m.poissons_ratio) / m.shear_modulus for m in (a, b))
     else:
         assert contact.stiffness is not None
-        row[_batch.MODULUS] = contact.stiffness
-        row[_batch.SHEAR] = contact.stiffness * contact.tangential_ratio
+        row[_columns.MODULUS] = contact.stiffness
+        row[_columns.SHEAR] = contact.stiffness * contact.tangential_ratio
     e = contact.restitution
     if law.normal != "hysteresis":
-        row[_batch.DAMPING] = damping(e, law.normal, limit_force=law.limit_force)
+        row[_columns.DAMPING] = damping(e, law.normal, limit_force=law.limit_force)
         if law.tangential_damping:
-            row[_batch.TANGENTIAL_DAMPING] = row[_batch.DAMPING]
-    row[_batch.UNLOADING] = 1.0 / e**2
+            row[_columns.TANGENTIAL_DAMPING] = row[_columns.DAMPING]
+    row[_columns.UNLOADING] = 1.0 / e**2
     sliding = contact.sliding_friction
-    row[_batch.FRICTION] = contact.friction
-    row[_batch.SLIDING] = contact.friction if sliding is None else sliding
-    row[_batch.ROLLING] = contact.rolling_friction
-    row[_batch.ROLLING_DAMPING] = contact.rolling_damping
-    row[_batch.COHESION] = contact.cohesion
-    row[_batch.NEAREST] = contact.nearest
-    row[_batch.REACH] = contact.reach
+    row[_columns.FRICTION] = contact.friction
+    row[_columns.SLIDING] = contact.friction if sliding is None else sliding
+    row[_columns.ROLLING] = contact.rolling_friction
+    row[_columns.ROLLING_DAMPING] = contact.rolling_damping
+    row[_columns.COHESION] = contact.cohesion
+    row[_columns.NEAREST] = contact.nearest
+    row[_columns.REACH] = contact.reach
     return row

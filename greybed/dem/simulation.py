@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numba
 import numpy as np
@@ -12,10 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from greybed.core.errors import InputError
 from greybed.core.processors import available_threads
-from greybed.dem import _batch, _step
+from greybed.dem import _columns, _step
 from greybed.dem.laws import COHESION, NORMAL, ROLLING, ContactLaw
 from greybed.dem.lists import Lists
 from greybed.dem.materials import Contact, Material, pair_tables
+from greybed.dem.particles import Energies, particle_arrays, rayleigh_time
 from greybed.dem.walls import SolidWall, surfaces_of
 
 Array = NDArray[np.float64]
@@ -24,20 +24,6 @@ Index = NDArray[np.int64]
 # Share of Rayleigh's time above which contacts are no longer followed [-].
 MOST_OF_RAYLEIGH = 0.4
 GRAVITY = (0.0, 0.0, -9.81)
-
-
-@dataclass(frozen=True)
-class Energies:
-    """Energies of all free particles [J]: of motion, of spin, and of height (0 at the origin)."""
-
-    kinetic: float
-    rotational: float
-    potential: float
-
-    @property
-    def total(self) -> float:
-        """Their sum [J]."""
-        return self.kinetic + self.rotational + self.potential
 
 
 class Simulation:
@@ -108,7 +94,9 @@ class Simulation:
         most_overlap: float = 0.3,
         threads: int | None = None,
     ) -> None:
-        place, motion, kind, known = _particles(centres, radii, materials, kinds, velocities, spins)
+        place, motion, kind, known = particle_arrays(
+            centres, radii, materials, kinds, velocities, spins
+        )
         n = len(place)
         self.law = law or ContactLaw()
         self.most_overlap = most_overlap
@@ -125,7 +113,7 @@ class Simulation:
                 )
             of_walls.append(names.index(name))
         self._law = self._tables(contacts, int(kind.max()) + 1, of_walls)
-        self._rayleigh = _rayleigh_time(place, kind, known)
+        self._rayleigh = rayleigh_time(place, kind, known)
         self.time_step = self._checked_step(time_step)
         self.gravity = np.array(gravity, dtype=np.float64)
         if self.gravity.shape != (3,) or not np.isfinite(self.gravity).all():
@@ -133,7 +121,11 @@ class Simulation:
         self._state = _step.State(
             place, motion, np.zeros((n, 8)), kind, place[:, :3].copy(), np.zeros(n, bool)
         )
-        reach = float(self._law.table[:, _batch.REACH].max()) if self.law.cohesion == "van-der-waals" else 0.0
+        reach = (
+            float(self._law.table[:, _columns.REACH].max())
+            if self.law.cohesion == "van-der-waals"
+            else 0.0
+        )
         self._lists = Lists(
             self._state,
             surfaces_of(walls),
@@ -216,7 +208,7 @@ class Simulation:
     def _in_order(self, values: NDArray[np.generic]) -> Array:
         result = np.empty_like(values)
         result[self._lists.ident] = values
-        return result  # type: ignore[return-value]
+        return result
 
     @property
     def centres(self) -> Array:
@@ -343,8 +335,8 @@ class Simulation:
         place = ", ".join(f"{c:.4g}" for c in self._state.place[low, :3])
         raise InputError(
             f"step {self.steps}: particles {i} and {j} at ({place}) [m] overlap by "
-            f"{count[b, 1]:.2g} of a radius, more than {self.most_overlap:g}; part them at the start, "
-            "or take a smaller time step, stiffer particles or a larger most_overlap."
+            f"{count[b, 1]:.2g} of a radius, more than {self.most_overlap:g}; part them at the "
+            "start, or take a smaller time step, stiffer particles or a larger most_overlap."
         )
 
     def _raise_lost(self, who: int) -> None:
@@ -354,60 +346,3 @@ class Simulation:
             "is no place: a force is infinite or no number; take a smaller time step, and check "
             "that no two particles start in the same place."
         )
-
-
-def _particles(
-    centres: ArrayLike,
-    radii: ArrayLike,
-    materials: Sequence[Material] | Material,
-    kinds: ArrayLike | None,
-    velocities: ArrayLike | None,
-    spins: ArrayLike | None,
-) -> tuple[Array, Array, Index, list[Material]]:
-    """Checked arrays of the particles."""
-    known = [materials] if isinstance(materials, Material) else list(materials)
-    names = [material.name for material in known]
-    if not known or len(set(names)) < len(names):
-        raise InputError(f"materials {names} must have different names, and be one at least.")
-    at = np.array(centres, dtype=np.float64)
-    if at.ndim != 2 or at.shape[1] != 3 or not len(at):
-        raise InputError(f"centres of shape {at.shape} must be (n, 3), n at least 1.")
-    n = len(at)
-    place = np.empty((n, 4))
-    place[:, :3] = at
-    place[:, 3] = np.asarray(radii, dtype=np.float64)
-    good = np.isfinite(place).all(axis=1) & (place[:, 3] > 0.0)
-    if not good.all():
-        i = int((~good).argmax())
-        raise InputError(
-            f"particle {i}: centre {place[i, :3].tolist()} and radius {place[i, 3]:g} [m] must be "
-            "finite, the radius above 0."
-        )
-    kind = np.zeros(n, np.int64) if kinds is None else np.array(kinds, dtype=np.int64)
-    if kind.shape != (n,) or kind.min() < 0 or kind.max() >= len(known):
-        raise InputError(
-            f"kinds must be {n} numbers in 0 ... {len(known) - 1}, one for each particle."
-        )
-    motion = np.zeros((n, 8))
-    for column, name, values in ((0, "velocities", velocities), (3, "spins", spins)):
-        if values is not None:
-            given = np.broadcast_to(np.asarray(values, dtype=np.float64), (n, 3))
-            if not np.isfinite(given).all():
-                raise InputError(f"{name} must be finite; particle {int(np.argwhere(~np.isfinite(given))[0, 0])} is not.")
-            motion[:, column : column + 3] = given
-    density = np.array([material.density for material in known])[kind]
-    motion[:, 6] = density * 4.0 / 3.0 * np.pi * place[:, 3] ** 3
-    motion[:, 7] = 0.4 * motion[:, 6] * place[:, 3] ** 2
-    return place, motion, kind, known
-
-
-def _rayleigh_time(place: Array, kind: Index, materials: list[Material]) -> float:
-    """Shortest time of a Rayleigh wave around a particle [s] (Thornton & Randall 1988)."""
-    shortest = math.inf
-    for number, m in enumerate(materials):
-        r = place[kind == number, 3]
-        if len(r):
-            speed = 0.163 * m.poissons_ratio + 0.8766
-            time = math.pi * float(r.min()) * math.sqrt(m.density / m.shear_modulus) / speed
-            shortest = min(shortest, time)
-    return shortest

@@ -24,8 +24,8 @@ class SolidWall:
     Attributes
     ----------
     shape : Wall
-        Plane, Cylinder, Cone, Disc, Polygon or Mesh. Spheres are on the side of a plane's normal and
-        inside a cylinder without end; shapes with an end have two sides.
+        Plane, Cylinder, Cone, Disc, Polygon or Mesh. Spheres are on the side of a plane's normal
+        and inside a cylinder without end; shapes with an end have two sides.
     material : str, optional
         Name of one of the simulation's materials; by default that of the first.
     velocity, spin : (3,) floats

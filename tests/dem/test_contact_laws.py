@@ -41,7 +41,7 @@ def test_restitution_of_spheres_of_two_sizes_and_materials_and_of_a_wall():
 
 
 # Hertz 1882 / Timoshenko: radius, speed, E, nu, density; deepest overlap, largest force, duration
-# as computed from the closed forms for Chung and Ooi's tests 1 and 2 (doi 10.1007/s10035-011-0277-0).
+# from the closed forms for Chung and Ooi's tests 1 and 2 (doi 10.1007/s10035-011-0277-0).
 CHUNG_OOI = {
     "1 glass": (0.01, 10.0, 48e9, 0.20, 2800.0, 274.1e-6, 10.70e3, 40.3e-6),
     "1 limestone": (0.01, 10.0, 20e9, 0.25, 2500.0, 368.3e-6, 7.108e3, 54.2e-6),
@@ -61,8 +61,10 @@ def test_elastic_impacts_of_chung_and_ooi(case):
                    speed=2.0 * speed, time_step=step)  # fmt: skip
     else:
         rigid = Material(1.0, 1e30, 0.3, "rigid")
-        sim = on_floor(contact=elastic, materials=[material, rigid], wall="rigid",
-                       radius=radius, time_step=step, velocities=[[0, 0, -speed]], gravity=(0, 0, 0))  # fmt: skip
+        sim = on_floor(
+            contact=elastic, materials=[material, rigid], wall="rigid", radius=radius,
+            time_step=step, velocities=[[0, 0, -speed]], gravity=(0, 0, 0),
+        )  # fmt: skip
     overlap, force, touching = [], [], 0
     for _ in range(2200):
         sim.run(1)

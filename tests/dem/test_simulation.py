@@ -64,8 +64,10 @@ def test_the_order_of_the_integrator():
 
 
 def test_friction_conserves_angular_momentum():
-    sim = pair(contact=Contact(0.5, 0.5), speed=0.5, time_step=1e-6,
-               velocities=[[0.2, 0.1, 0.0], [-0.2, -0.1, 0.05]], spins=[[0, 0, 90], [30, 0, 0]])  # fmt: skip
+    sim = pair(
+        contact=Contact(0.5, 0.5), speed=0.5, time_step=1e-6,
+        velocities=[[0.2, 0.1, 0.0], [-0.2, -0.1, 0.05]], spins=[[0, 0, 90], [30, 0, 0]],
+    )  # fmt: skip
 
     def angular():
         inertia = 0.4 * sim.masses * sim.radii**2
@@ -221,7 +223,10 @@ def test_memory_of_a_dense_bed_is_small():
         ({"walls": [SolidWall(Plane((0, 0, -1), (0, 0, 1)), "wood")]}, "no material is called"),
         ({"skin": 0.0}, "skin = 0"),
         ({"kinds": [0, 1]}, "kinds must be 2 numbers in 0 ... 0"),
-        ({"velocities": [[0, 0, 0], [np.nan, 0, 0]]}, "velocities must be finite; particle 1"),
+        (
+            {"velocities": [[0, 0, 0], [np.nan, 0, 0]]},
+            "velocities must be finite; that of particle 1",
+        ),
     ],
 )
 def test_refusals_before_the_first_step(change, says):
@@ -233,12 +238,14 @@ def test_refusals_before_the_first_step(change, says):
 def test_a_missing_pair_and_deep_overlap_are_named():
     two = [GLASS, Material(1000, 1e6, 0.3, "wood")]
     with pytest.raises(InputError, match="'glass' and 'wood' have no contact"):
-        Simulation([[0, 0, 0], [1, 0, 0]], R, two, {("glass", "glass"): Contact(1, 0)}, kinds=[0, 1])
+        Simulation(
+            [[0, 0, 0], [1, 0, 0]], R, two, {("glass", "glass"): Contact(1, 0)}, kinds=[0, 1]
+        )
     with pytest.raises(InputError, match=r"particles 0 and 1 at .* overlap by 1.5 of a radius"):
         Simulation([[0, 0, 0], [0.5 * R, 0, 0]], R, GLASS, Contact(0.5, 0.3))
 
 
 def test_a_lost_particle_stops_the_run():
     sim = Simulation([[0, 0, 0], [0, 0, 0]], R, GLASS, Contact(0.5, 0.3), most_overlap=9.0)
-    with pytest.raises(InputError, match="particle [01] is at .*nan"):
+    with pytest.raises(InputError, match=r"particle [01] is at .*nan"):
         sim.run(3)
