@@ -100,17 +100,11 @@ def run(options: argparse.Namespace) -> int:
 
     from greybed.closures import content_hash, load, model_path
     from greybed.closures.term import is_term, load_term
-    from greybed.core import InputError
     from greybed.core.files import atomic_path, output_folder, write_summary
 
     model = model_path(options.model)
     term = load_term(model) if is_term(model) else None
     closure = None if term is not None else load(model)
-    if closure is not None and closure.quantity != "viewfactor":
-        raise InputError(
-            f"{options.model}: closures of {closure.quantity} cannot be exported yet; export one "
-            "of pairs of spheres, or evaluate this one in Python."
-        )
     folder = output_folder(options.out)
     results: dict[str, Any] = {}
     # Files reach their place only after the replay: a header that computes wrongly is never seen.

@@ -1,5 +1,6 @@
 """The coupled thermal bed: conduction, radiation through view factors, steady and transient."""
 
+from greybed.core.diffuse import DiffuseExchange, diffuse_exchange
 from greybed.coupling.conduction import Conductances, contact_conductances
 from greybed.coupling.radiation import NetRadiation, net_radiation
 from greybed.coupling.radiative_network import (
@@ -13,6 +14,7 @@ from greybed.coupling.thermal import Material, ThermalBed
 
 __all__ = [
     "Conductances",
+    "DiffuseExchange",
     "Material",
     "NetRadiation",
     "RadiativeResult",
@@ -23,6 +25,7 @@ __all__ = [
     "ThermalResult",
     "balanced",
     "contact_conductances",
+    "diffuse_exchange",
     "net_radiation",
     "pairwise_network",
     "radiative_network",

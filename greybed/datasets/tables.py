@@ -42,7 +42,7 @@ def wall_rows_of(packing: Packing, emitters: int, rays: int, seed: int) -> dict[
     weight = np.exp(-0.3 * near)
     some = min(3 * emitters, len(packing))
     who = np.sort(rng.choice(len(packing), some, replace=False, p=weight / weight.sum()))
-    m = wall_markers(packing, neighbourhood(packing, reach, who), reach, phi)
+    m = wall_markers(packing, neighbourhood(packing, reach, who), reach, phi, sparing=False)
     traced = view_factors(packing, rays=rays, seed=seed + 1, emitters=who)
     columns = {name: getattr(m, name).ravel() for name in WALL_MARKERS} | {
         "exact": m.wall_share.ravel(),

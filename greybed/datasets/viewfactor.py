@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from greybed._version import __version__
 from greybed.closures.viewfactor import PairMarkers, neighbourhood, pair_markers
 from greybed.closures.viewfactor.bed import inner_fraction
-from greybed.closures.viewfactor.exact import pair_factor
 from greybed.core import InputError, Packing
+from greybed.core.exact import pair_factor
 from greybed.core.files import atomic_path, output_folder, writable_file
 from greybed.core.processes import finished, processes
 from greybed.core.progress import progress

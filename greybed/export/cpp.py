@@ -16,11 +16,18 @@ from numpy.typing import NDArray
 
 from greybed.closures import ViewFactorClosure, golden_rows
 from greybed.closures.predictors import Forest, Network
-from greybed.closures.viewfactor.exact import TOUCHING, quadrature
 from greybed.closures.viewfactor.visibility import ODDS_BOUND, SPREAD_BOUND
 from greybed.core import InputError
+from greybed.core.exact import TOUCHING, quadrature
 from greybed.core.files import atomic_path, output_folder
-from greybed.export.metadata import LICENCE, allowed, dataset_hash, describe, export_name
+from greybed.export.metadata import (
+    LICENCE,
+    QUANTITIES,
+    allowed,
+    dataset_hash,
+    describe,
+    export_name,
+)
 
 # Relative difference that a golden row may show on another machine or with -ffast-math.
 TOLERANCE = 1e-12
@@ -45,18 +52,37 @@ add_test(NAME {name} COMMAND {name}_test)
 
 @dataclass(frozen=True)
 class Formulae:
-    """What a marker set computes, in C++: features, 1 - gate, gate and baseline of its markers."""
+    """What a marker set computes, in C++.
+
+    Attributes
+    ----------
+    features : tuple of str
+        One expression each.
+    before : tuple of str
+        Statements before the rest.
+    clear, gate, baseline, exact : str
+        1 - gate, gate, baseline, and the factor that they share out.
+    """
 
     features: tuple[str, ...]
-    before: str
+    before: tuple[str, ...]
     clear: str
     gate: str
     baseline: str
+    exact: str
 
 
 _PAIR = (
     "radius_over_distance * (1.0 + 1.0 / radius_ratio)",
     "4.0 * radius_ratio / ((1.0 + radius_ratio) * (1.0 + radius_ratio))",
+)
+_FREE = "detail::pair_factor(radius_over_distance, radius_ratio)"
+_OPEN = (
+    # By a choice, so that -ffast-math cannot put the one together with what follows.
+    ("const double open = blocked_fraction < 1.0 ? 1.0 - blocked_fraction : 0.0;",),
+    "(open * open) * (open * open)",
+    "1.0 - clear",
+    "0.01 + 0.98 * (1.0 - 1.0 / (1.0 + open * (1.0 + open * (1.0 + open))))",
 )
 # The same operations in the same order as in greybed.closures.viewfactor.visibility: features of
 # a forest are cut to single precision, so their last bits can decide a branch. ``clear`` is
@@ -64,17 +90,46 @@ _PAIR = (
 FORMULAE = {
     "published": Formulae(
         (*_PAIR, "std::log1p(n_between)", "solid_fraction"),
-        "",
+        (),
         "std::exp(-6.0 * n_between)",
         "-std::expm1(-6.0 * n_between)",
         "0.01 + 0.98 * std::exp(-0.25 * n_between)",
+        _FREE,
     ),
     "pencil": Formulae(
-        (*_PAIR, "blocked_fraction", "std::log1p(blockers_per_line)"),
-        "const double open = 1.0 - blocked_fraction;",
-        "(open * open) * (open * open)",
-        "1.0 - clear",
-        "0.01 + 0.98 * (1.0 - 1.0 / (1.0 + open * (1.0 + open * (1.0 + open))))",
+        (*_PAIR, "blocked_fraction", "std::log1p(blockers_per_line)"), *_OPEN, _FREE
+    ),
+    "wall": Formulae(
+        (
+            "blocked_fraction",
+            "std::log(1e-3 + open)",
+            "1.0 / distance_over_radius",
+            "wall_share",
+            "solid_fraction",
+        ),
+        *_OPEN,
+        "wall_share",
+    ),
+    # Neither part is the difference of the other from one, so D = F exactly at emissivity 1. A
+    # black pair that is wholly hidden has nothing to share out.
+    "exchange": Formulae(
+        (
+            _PAIR[0],
+            f"std::log({_PAIR[0]})",
+            _PAIR[1],
+            "visible_share",
+            "emissivity",
+            "solid_fraction",
+        ),
+        (
+            f"const double direct = emissivity * visible_share * {_FREE};",
+            "const double ratio2 = radius_ratio * radius_ratio;",
+            "const double reflected = (1.0 - emissivity) * ratio2 / (1.0 + ratio2);",
+        ),
+        "exact > 0.0 ? direct / exact : 1.0",
+        "exact > 0.0 ? reflected / exact : 0.0",
+        "0.002 + 0.1 * features[0] * features[0]",
+        "direct + reflected",
     ),
 }
 
@@ -170,12 +225,12 @@ def _context(closure: ViewFactorClosure, name: str) -> dict[str, Any]:
         )
     formulae = FORMULAE[closure.markers.name]
     predictor, domain = closure.predictor, closure.domain
-    squares, weights = quadrature()
     with np.errstate(over="ignore"):
         limit2 = float(_finite(np.float64(domain.limit) ** 2))
+    of_pairs = closure.quantity != "wallfactor"
+    nodes = zip(("node_square", "node_weight"), quadrature(), strict=True)
     tables = [
-        _doubles("node_square", squares),
-        _doubles("node_weight", weights),
+        *(_doubles(*node) for node in nodes if of_pairs),
         _doubles("domain_low", _finite(domain.low)),
         _doubles("domain_high", _finite(domain.high)),
         _doubles("domain_centre", domain.centre),
@@ -200,6 +255,8 @@ def _context(closure: ViewFactorClosure, name: str) -> dict[str, Any]:
         "name": name,
         "guard": f"GREYBED_{name.upper()}_HPP",
         "kind": closure.kind,
+        "quantity": QUANTITIES[closure.quantity],
+        "of_pairs": of_pairs,
         "markers": closure.markers.markers,
         "allowed": allowed,
         "largest": repr(_LARGEST),
@@ -233,12 +290,20 @@ def _environment() -> Any:
     )
     environment.filters["quoted"] = _quoted
     environment.filters["wrapped"] = _wrapped
+    environment.filters["capital"] = _capital
     return environment
+
+
+def _capital(text: str) -> str:
+    """The text with its first letter large."""
+    return text[:1].upper() + text[1:]
 
 
 def _wrapped(line: str) -> str:
     """A long line of C++, continued four columns further in."""
-    body = line.strip().replace("double* ", "double*\1")  # kept with the name that follows
+    body = (
+        line.strip().replace("double* ", "double*\1").replace("double ", "double\1")
+    )  # kept with the name that follows
     indent = " " * (len(line) - len(line.lstrip()))
     text = textwrap.fill(
         body,

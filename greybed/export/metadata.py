@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from math import isinf
 
 from greybed._version import __version__
@@ -11,6 +12,57 @@ from greybed.closures.viewfactor.visibility import Marker
 from greybed.core import InputError
 
 LICENCE = "BSD-3-Clause"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a closure gives, in words for those who only have the exported form.
+
+    Attributes
+    ----------
+    title : str
+        The number and its symbol.
+    output : str
+        Name of the number in tables and graphs.
+    law : tuple of str
+        The formula and what its parts are, a line each.
+    """
+
+    title: str
+    output: str
+    law: tuple[str, ...]
+
+
+QUANTITIES = {
+    "viewfactor": Quantity(
+        "view factor F_ij from sphere i to sphere j",
+        "view_factor",
+        (
+            "F_ij = F_exact(r_i, r_j, d) V,   V = 1 - gate (1 - v),   0 < v < 1",
+            "F_exact is the unobstructed factor; v is learnt; gate is exactly 0, so V = 1, where",
+            "nothing stands between the spheres.",
+        ),
+    ),
+    "wallfactor": Quantity(
+        "view factor F_iw from sphere i to a wall",
+        "wall_factor",
+        (
+            "F_iw = wall_share V,   V = 1 - gate (1 - v),   0 < v < 1",
+            "wall_share is the unobstructed factor, the wall's solid angle over 4 pi (exact for a",
+            "sphere that the wall's plane does not cut); v is learnt; gate is exactly 0, so V = 1,",
+            "where nothing stands before the wall.",
+        ),
+    ),
+    "exchange": Quantity(
+        "exchange factor D_ij from sphere i to sphere j",
+        "exchange_factor",
+        (
+            "D_ij = e F_ij + (1 - e) K_ij,   K_ij = v r_j^2 / (r_i^2 + r_j^2),   0 < v < 1",
+            "F_ij = visible_share F_exact(r_i, r_j, d) is what reaches j directly, F_exact the",
+            "unobstructed factor; K is what j absorbs of reflected light; v is learnt.",
+        ),
+    ),
+}
 
 # Words of C++20 that would break the namespace of a header; identifiers with __ are refused too.
 _RESERVED = """
@@ -58,7 +110,7 @@ def describe(closure: ViewFactorClosure, name: str) -> dict[str, str]:
     """Plain strings that travel with every exported form."""
     return {
         "name": name,
-        "quantity": "view factor F_ij between spheres [-]",
+        "quantity": f"{QUANTITIES[closure.quantity].title} [-]",
         "kind": closure.kind,
         "marker_set": closure.markers.name,
         "greybed_version": __version__,

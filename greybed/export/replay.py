@@ -140,7 +140,7 @@ class CompiledClosure:
             ) from None
 
     def evaluate(self, **markers: ArrayLike) -> Array:
-        """View factors F_ij [-] of markers by name."""
+        """View, wall or exchange factors [-] of markers by name."""
         return self.predict(**markers).view_factor
 
     def predict(self, **markers: ArrayLike) -> Prediction:
@@ -200,16 +200,17 @@ class OnnxClosure:
         self.metadata = dict(self._session.get_modelmeta().custom_metadata_map)
         self.name, self.hash = self.metadata.get("name", ""), self.metadata.get("hash", "")
         self.marker_names = tuple(value.name for value in self._session.get_inputs())
+        self._outputs = [value.name for value in self._session.get_outputs()]
 
     def evaluate(self, **markers: ArrayLike) -> Array:
-        """View factors F_ij [-] of markers by name."""
+        """View, wall or exchange factors [-] of markers by name."""
         return self.predict(**markers).view_factor
 
     def predict(self, **markers: ArrayLike) -> Prediction:
         """Factor, standard error and extrapolation."""
         columns, shape = _flat(self.marker_names, markers)
         feed = dict(zip(self.marker_names, columns, strict=True))
-        results = self._session.run(["view_factor", "stderr", "extrapolates"], feed)
+        results = self._session.run(self._outputs, feed)
         return Prediction(*(np.reshape(result, shape) for result in results))
 
 

@@ -1,8 +1,9 @@
-"""A closure as an ONNX graph in double precision: markers by name in, view factor and error out."""
+"""A closure as an ONNX graph in double precision: markers by name in, factor and error out."""
 
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,11 @@ from numpy.typing import NDArray
 
 from greybed.closures import ViewFactorClosure
 from greybed.closures.predictors import Forest, Network
-from greybed.closures.viewfactor.exact import TOUCHING, quadrature
 from greybed.closures.viewfactor.visibility import ODDS_BOUND, SPREAD_BOUND
 from greybed.core import InputError
+from greybed.core.exact import TOUCHING, quadrature
 from greybed.core.files import atomic_path
-from greybed.export.metadata import describe, export_name
+from greybed.export.metadata import QUANTITIES, describe, export_name
 
 # Operators of 2022, so that older runtimes read a network; a forest needs TreeEnsemble of 2024,
 # the first one that gives doubles.
@@ -81,19 +82,38 @@ def _pair(g: Graph) -> tuple[str, str]:
     return reach, g.add("Div", g.add("Mul", 4.0, ratio), g.add("Mul", total, total))
 
 
-def _published(g: Graph) -> tuple[list[str], tuple[str, str], str]:
-    """Names of the features, of 1 - gate and gate, and of the baseline."""
+@dataclass(frozen=True)
+class Parts:
+    """Names of what a marker set computes in a graph.
+
+    Attributes
+    ----------
+    features : tuple of str
+        A value each.
+    clear, gate, baseline, exact : str
+        1 - gate, gate, baseline, and the factor that they share out.
+    """
+
+    features: tuple[str, ...]
+    clear: str
+    gate: str
+    baseline: str
+    exact: str
+
+
+def _published(g: Graph) -> Parts:
     n = "n_between"
     # 1 - exp(-6 n) = 2 t / (1 + t) with t = tanh(3 n): exact zero at n = 0, no cancellation.
     t = g.add("Tanh", g.add("Mul", 3.0, n))
     gate = g.add("Div", g.add("Mul", 2.0, t), g.add("Add", 1.0, t))
     clear = g.add("Exp", g.add("Mul", -6.0, n))
     baseline = g.add("Add", 0.01, g.add("Mul", 0.98, g.add("Exp", g.add("Mul", -0.25, n))))
-    return [*_pair(g), _log1p(g, n), "solid_fraction"], (clear, gate), baseline
+    features = (*_pair(g), _log1p(g, n), "solid_fraction")
+    return Parts(features, clear, gate, baseline, _pair_factor(g))
 
 
-def _pencil(g: Graph) -> tuple[list[str], tuple[str, str], str]:
-    """Names of the features, of 1 - gate and gate, and of the baseline."""
+def _open(g: Graph) -> tuple[str, str, str, str]:
+    """The free share of the lines, and 1 - gate, gate and baseline made of it."""
     free = g.add("Sub", 1.0, "blocked_fraction")
     square = g.add("Mul", free, free)
     clear = g.add("Mul", square, square)
@@ -102,11 +122,44 @@ def _pencil(g: Graph) -> tuple[list[str], tuple[str, str], str]:
     for _ in range(2):
         cubic = g.add("Add", 1.0, g.add("Mul", free, cubic))
     share = g.add("Sub", 1.0, g.add("Div", 1.0, cubic))
-    baseline = g.add("Add", 0.01, g.add("Mul", 0.98, share))
-    return [*_pair(g), "blocked_fraction", _log1p(g, "blockers_per_line")], (clear, gate), baseline
+    return free, clear, gate, g.add("Add", 0.01, g.add("Mul", 0.98, share))
 
 
-FORMULAE = {"published": _published, "pencil": _pencil}
+def _pencil(g: Graph) -> Parts:
+    _, clear, gate, baseline = _open(g)
+    features = (*_pair(g), "blocked_fraction", _log1p(g, "blockers_per_line"))
+    return Parts(features, clear, gate, baseline, _pair_factor(g))
+
+
+def _wall(g: Graph) -> Parts:
+    free, clear, gate, baseline = _open(g)
+    features = (
+        "blocked_fraction",
+        g.add("Log", g.add("Add", 1e-3, free)),
+        g.add("Div", 1.0, "distance_over_radius"),
+        "wall_share",
+        "solid_fraction",
+    )
+    return Parts(features, clear, gate, baseline, "wall_share")
+
+
+def _exchange(g: Graph) -> Parts:
+    near, alike = _pair(g)
+    direct = g.add("Mul", g.add("Mul", "emissivity", "visible_share"), _pair_factor(g))
+    ratio2 = g.add("Mul", "radius_ratio", "radius_ratio")
+    loss = g.add("Mul", g.add("Sub", 1.0, "emissivity"), ratio2)
+    reflected = g.add("Div", loss, g.add("Add", 1.0, ratio2))
+    exact = g.add("Add", direct, reflected)
+    # A black pair that is wholly hidden has nothing to share out.
+    some = g.add("Greater", exact, 0.0)
+    safe = g.add("Where", some, exact, 1.0)
+    clear = g.add("Where", some, g.add("Div", direct, safe), 1.0)
+    baseline = g.add("Add", 0.002, g.add("Mul", g.add("Mul", 0.1, near), near))
+    features = (near, g.add("Log", near), alike, "visible_share", "emissivity", "solid_fraction")
+    return Parts(features, clear, g.add("Div", reflected, safe), baseline, exact)
+
+
+FORMULAE = {"published": _published, "pencil": _pencil, "wall": _wall, "exchange": _exchange}
 
 
 def _pair_factor(g: Graph) -> str:
@@ -193,14 +246,17 @@ def _bounds(g: Graph, raw_value: str, raw_spread: str, baseline: str) -> tuple[s
     return share, error
 
 
-def _in_range(g: Graph, closure: ViewFactorClosure, reach: str) -> str:
+def _in_range(g: Graph, closure: ViewFactorClosure, nearest: str) -> str:
     """Whether all markers lie where the closure is defined; false for NaN."""
-    valid = g.add("LessOrEqual", reach, 1.0 / (1.0 - TOUCHING))
+    valid = ""
+    if closure.quantity != "wallfactor":
+        valid = g.add("LessOrEqual", nearest, 1.0 / (1.0 - TOUCHING))
     for marker in closure.markers.markers:
         lower = g.add("Greater" if marker.low_open else "GreaterOrEqual", marker.name, marker.low)
         high = min(marker.high, float(np.finfo(np.float64).max))
         upper = g.add("LessOrEqual", marker.name, high)
-        valid = g.add("And", valid, g.add("And", lower, upper))
+        sound = g.add("And", lower, upper)
+        valid = g.add("And", valid, sound) if valid else sound
     return valid
 
 
@@ -217,8 +273,9 @@ def _outside(g: Graph, closure: ViewFactorClosure, features: str) -> str:
 
 
 def _fill(g: Graph, closure: ViewFactorClosure) -> None:
-    columns, (clear, gate), baseline = FORMULAE[closure.markers.name](g)
-    features = g.add("Concat", *(g.column(name) for name in columns), axis=1)
+    parts = FORMULAE[closure.markers.name](g)
+    gate, exact = parts.gate, parts.exact
+    features = g.add("Concat", *(g.column(name) for name in parts.features), axis=1)
     predictor = closure.predictor
     if isinstance(predictor, Network):
         raw = _network(g, predictor, features)
@@ -227,14 +284,13 @@ def _fill(g: Graph, closure: ViewFactorClosure) -> None:
     first = g.add("Gather", raw, np.array(0, dtype=np.int64), axis=1)
     second = g.add("Gather", raw, np.array(1, dtype=np.int64), axis=1)
     if closure.kind == "mlp":
-        first, second = _bounds(g, first, second, baseline)
-    exact = _pair_factor(g)
+        first, second = _bounds(g, first, second, parts.baseline)
     # 1 - gate (1 - v) without the cancellation where v is small
-    visible = g.add("Add", clear, g.add("Mul", gate, first))
+    visible = g.add("Add", parts.clear, g.add("Mul", gate, first))
     factor = g.add("Mul", exact, visible)
     error = g.add("Mul", g.add("Mul", exact, gate), second)
-    valid = _in_range(g, closure, columns[0])
-    g.add("Where", valid, factor, np.nan, out="view_factor")
+    valid = _in_range(g, closure, parts.features[0])
+    g.add("Where", valid, factor, np.nan, out=QUANTITIES[closure.quantity].output)
     g.add("Where", valid, error, np.nan, out="stderr")
     far = g.add("And", g.add("Greater", gate, 0.0), _outside(g, closure, features))
     g.add("Or", far, g.add("Not", valid), out="extrapolates")
@@ -257,8 +313,9 @@ def export_onnx(
     Returns
     -------
     file : Path
-        Inputs: the markers by name, each float64 [N]. Outputs: ``view_factor`` and ``stderr``,
-        float64 [N], NaN where a marker is out of range; ``extrapolates``, bool [N].
+        Inputs: the markers by name, each float64 [N]. Outputs: ``view_factor``, ``wall_factor``
+        or ``exchange_factor``, and ``stderr``, float64 [N], NaN where a marker is out of range;
+        ``extrapolates``, bool [N].
 
     Raises
     ------
@@ -289,7 +346,9 @@ def export_onnx(
         for marker in closure.markers.markers
     ]
     outputs = [
-        helper.make_tensor_value_info("view_factor", TensorProto.DOUBLE, ["N"]),
+        helper.make_tensor_value_info(
+            QUANTITIES[closure.quantity].output, TensorProto.DOUBLE, ["N"]
+        ),
         helper.make_tensor_value_info("stderr", TensorProto.DOUBLE, ["N"]),
         helper.make_tensor_value_info("extrapolates", TensorProto.BOOL, ["N"]),
     ]
@@ -304,7 +363,7 @@ def export_onnx(
         ir_version=ML_IR_VERSION if closure.kind == "forest" else IR_VERSION,
         producer_name="greybed",
         producer_version=facts["greybed_version"],
-        doc_string="F_ij = F_exact V, V = 1 - gate (1 - v); gate = 0 where nothing stands between",
+        doc_string=" ".join(QUANTITIES[closure.quantity].law),
     )
     helper.set_model_props(model, facts)
     onnx.checker.check_model(model, full_check=True)

@@ -6,8 +6,8 @@ import pytest
 from greybed.closures import ViewFactorClosure
 from greybed.closures.viewfactor import MARKER_SETS
 from greybed.closures.viewfactor.closure import Domain
-from greybed.closures.viewfactor.exact import pair_factor
 from greybed.closures.viewfactor.limits import random_markers
+from greybed.core.exact import pair_factor
 from greybed.training.forest import fit_forest
 from greybed.training.network import fit_network
 from greybed.training.rows import Rows

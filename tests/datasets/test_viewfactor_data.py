@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from greybed.closures.viewfactor.exact import pair_factor
 from greybed.core import InputError
+from greybed.core.exact import pair_factor
 from greybed.datasets import viewfactor
 from greybed.datasets.beds import (
     BEDS,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from sklearn.ensemble import RandomForestRegressor
 
-from greybed.closures import ViewFactorClosure
+from greybed.closures import ViewFactorClosure, shipped
 from greybed.closures.predictors import Forest, Network
 from greybed.closures.viewfactor.closure import Domain
 from greybed.closures.viewfactor.limits import random_markers
@@ -27,7 +27,7 @@ FLAGS = {
     "O3 native": ("-std=c++17", "-O3", "-march=native", *WARNINGS),
     "O3 native fast-math": ("-std=c++20", "-O3", "-march=native", "-ffast-math", *WARNINGS),
 }
-# Closures of pairs: those to walls and of exchange have no exported form.
+# Closures of pairs; those to walls and of exchange have tests of their own.
 PAIRS = [name for name, markers in MARKER_SETS.items() if markers.quantity == "viewfactor"]
 UNTRAINED = [f"{kind} {markers} 3" for kind in ("mlp", "forest") for markers in PAIRS]
 # Weights that bend the odds far down, and a pair that is hardly visible.
@@ -40,6 +40,9 @@ HARD = {
     }
 }
 FITTED = ["fitted mlp pencil", "fitted forest published"]
+# To walls, and exchange factors: the shipped ones for trained ones.
+OTHERS = [f"{kind} {markers} 3" for kind in ("mlp", "forest") for markers in ("wall", "exchange")]
+SHIPPED = ["shipped wallfactor_mlp_wall", "shipped exchange_mlp_exchange"]
 
 
 def _samples(markers):
@@ -93,9 +96,11 @@ def _fitted_forest(markers, trees=10, depth=9):
 def closures():
     """Every closure of these tests, by name."""
     made = {}
-    for name in [*UNTRAINED, *HARD]:
+    for name in [*UNTRAINED, *OTHERS, *HARD]:
         kind, markers, seed = name.split()
         made[name] = ViewFactorClosure.untrained(kind, markers, int(seed))
+    for name in SHIPPED:
+        made[name] = shipped(name.split()[1])
     made["fitted mlp pencil"] = _fitted_network("pencil")
     made["fitted forest published"] = _fitted_forest("published")
     return made

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from greybed.closures.viewfactor.exact import pair_factor
 from greybed.closures.viewfactor.markers import pair_markers
 from greybed.closures.viewfactor.neighbourhood import neighbourhood
 from greybed.closures.viewfactor.walls import WallMarkers, wall_markers
-from greybed.core import Packing, RangeError
+from greybed.core import InputError, Packing, RangeError
+from greybed.core.exact import pair_factor
 
 if TYPE_CHECKING:
     from greybed.closures.viewfactor.closure import ViewFactorClosure
@@ -83,12 +83,24 @@ def bed_factors(
     -------
     BedFactors
 
+    Raises
+    ------
+    InputError
+        If the closure is not one of pairs of spheres.
+    RangeError
+        If ``reach`` or ``solid_fraction`` is out of range, or two spheres have one centre.
+
     Notes
     -----
     Each wall's exact free share is multiplied with its visibility along 4096 fixed lines a
     sphere, blocked by the real neighbours; the opening is what those lines see of it. Rows add up
     to one within the errors; :meth:`ViewFactorClosure.factors` balances them.
     """
+    if closure.quantity != "viewfactor":
+        raise InputError(
+            f"this closure gives {closure.quantity}, not the view factors of pairs that a whole "
+            "bed is made of; take shipped('viewfactor_mlp_pencil')."
+        )
     phi = inner_fraction(packing) if solid_fraction is None else solid_fraction
     if not 0.0 < phi < 1.0:
         raise RangeError(f"solid_fraction = {phi:g} [-] must lie in (0, 1); check the packing.")

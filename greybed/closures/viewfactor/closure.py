@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from greybed.closures.predictors import PREDICTORS, Predictor
-from greybed.closures.viewfactor.exact import TOUCHING
 from greybed.closures.viewfactor.visibility import (
     MARKER_SETS,
     MarkerSet,
@@ -17,9 +16,11 @@ from greybed.closures.viewfactor.visibility import (
     unblocked_share,
 )
 from greybed.core import Packing, RangeError
+from greybed.core.exact import TOUCHING
 
 if TYPE_CHECKING:
     from greybed.closures.viewfactor.bed import BedFactors
+    from greybed.core.diffuse import DiffuseExchange
     from greybed.core.rows import Rows
 
 Array = NDArray[np.float64]
@@ -199,7 +200,8 @@ class ViewFactorClosure:
         exact = self.markers.exact(flat)
         # A sum of two positive parts: 1 - gate (1 - share) would cancel where little is visible,
         # and with it reciprocity.
-        factor = exact * ((1.0 - gate) + gate * share)
+        clear = 1.0 - gate if self.markers.clear is None else self.markers.clear(flat)
+        factor = exact * (clear + gate * share)
         error = exact * gate * spread(self.kind, raw[:, 1])
         outside = self.domain.outside(features) & (gate > 0.0)
         return Prediction(factor.reshape(shape), error.reshape(shape), outside.reshape(shape))
@@ -236,6 +238,54 @@ class ViewFactorClosure:
 
         bed = self.bed_factors(packing, **options)
         return balanced(Rows.of(bed, packing))
+
+    def exchange(
+        self,
+        packing: Packing,
+        emissivity: ArrayLike,
+        *,
+        wall_emissivity: ArrayLike = 1.0,
+        wall_exchange: ArrayLike | None = None,
+        sides: int = 24,
+        **options: Any,
+    ) -> DiffuseExchange:
+        """Exchange factors of a whole bed, each sphere cut into sides that reflect evenly.
+
+        Parameters
+        ----------
+        packing : Packing
+            The bed, with its walls.
+        emissivity : array_like, shape () or (n,)
+            Of the spheres, 0.001 ... 1 [-].
+        wall_emissivity : array_like, shape () or (n_walls,)
+            Of the walls, 0 ... 1 [-].
+        wall_exchange : array_like, shape (n_walls, n_walls), optional
+            Exchange areas A F between the walls themselves [m2], for grey walls.
+        sides : int
+            Sides of each sphere [-]; 1 for one radiosity per sphere, quicker and biased.
+        **options
+            Those of :meth:`factors`.
+
+        Returns
+        -------
+        DiffuseExchange
+            ``emitted_by(spheres)`` gives rows, ``rows()`` all of them, ``heats(power)`` net heats.
+
+        Raises
+        ------
+        InputError
+            As :meth:`factors` and :func:`greybed.core.diffuse.diffuse_exchange`.
+        """
+        from greybed.core.diffuse import diffuse_exchange
+
+        return diffuse_exchange(
+            self.factors(packing, **options),
+            emissivity,
+            wall_emissivity=wall_emissivity,
+            wall_exchange=wall_exchange,
+            packing=packing,
+            sides=sides,
+        )
 
     def _checked(self, markers: dict[str, ArrayLike]) -> dict[str, Array]:
         wanted, given = set(self.marker_names), set(markers)

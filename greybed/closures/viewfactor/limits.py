@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from greybed.closures.viewfactor.closure import ViewFactorClosure
-from greybed.closures.viewfactor.exact import exact_view_factor, pair_factor
+from greybed.core.exact import exact_view_factor, pair_factor
 
 Array = NDArray[np.float64]
 # Anything that maps markers to factors: a closure, an ONNX session, a compiled library.
@@ -148,9 +148,8 @@ def _exchange_cases(law: Evaluate, markers: dict[str, Array], rounding: float) -
         LimitCase("D < 1: share of pairs that violate it", _share(~(factor < 1.0)), 0.0),
         LimitCase("D >= e F: largest lack",
                   _highest(markers["emissivity"] * view - factor), rounding),
-        # What is small is what reflections leave of a bound of order one.
         LimitCase("reciprocity A_i e D_ij = A_j e D_ji", _largest(back / factor - 1.0),
-                  1e4 * rounding),
+                  4.0 * rounding),
     ]  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from greybed.closures.viewfactor.exact import pair_factor
+from greybed.core.exact import pair_factor
 
 Array = NDArray[np.float64]
 Markers = dict[str, Array]
@@ -151,12 +151,23 @@ def _reflected_bound(m: Markers) -> Array:
     return (1.0 - m["emissivity"]) * ratio2 / (1.0 + ratio2)
 
 
+def _absorbed_directly(m: Markers) -> Array:
+    return m["emissivity"] * m["visible_share"] * _pair_exact(m)
+
+
 def _exchange_exact(m: Markers) -> Array:
-    return m["emissivity"] * m["visible_share"] * _pair_exact(m) + _reflected_bound(m)
+    return _absorbed_directly(m) + _reflected_bound(m)
 
 
 def _exchange_gate(m: Markers) -> Array:
-    return _reflected_bound(m) / _exchange_exact(m)
+    exact = _exchange_exact(m)
+    # A black pair that is wholly hidden exchanges nothing: there is nothing to share out.
+    return np.divide(_reflected_bound(m), exact, out=np.zeros_like(exact), where=exact > 0.0)
+
+
+def _exchange_clear(m: Markers) -> Array:
+    exact = _exchange_exact(m)
+    return np.divide(_absorbed_directly(m), exact, out=np.ones_like(exact), where=exact > 0.0)
 
 
 def _exchange_baseline(m: Markers) -> Array:
@@ -174,7 +185,8 @@ def _exchange_features(m: Markers) -> Array:
 class MarkerSet:
     """Inputs of a closure and what visibility makes of them.
 
-    ``exact`` is the factor with nothing in between, ``quantity`` what the closure gives.
+    ``exact`` is the factor with nothing in between, ``quantity`` what the closure gives, ``clear``
+    1 - gate where the subtraction would lose digits that matter.
     """
 
     name: str
@@ -185,6 +197,7 @@ class MarkerSet:
     baseline: Callable[[Markers], Array]
     exact: Callable[[Markers], Array] = _pair_exact
     quantity: str = "viewfactor"
+    clear: Callable[[Markers], Array] | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -246,6 +259,7 @@ MARKER_SETS = {
         _exchange_baseline,
         _exchange_exact,
         "exchange",
+        _exchange_clear,
     ),
 }
 

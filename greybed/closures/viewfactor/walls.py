@@ -181,6 +181,7 @@ def wall_markers(
     reach: float,
     solid_fraction: float,
     *,
+    sparing: bool = True,
     threads: int | None = None,
 ) -> WallMarkers:
     """Markers of every emitter of a neighbourhood and every wall of its packing.
@@ -195,6 +196,9 @@ def wall_markers(
         Beyond it the bed is a mean field: exp(-length / mean chord) [m].
     solid_fraction : float
         Solid fraction inside the bed [-].
+    sparing : bool
+        Fewer lines deep in the bed, which is right on the mean; training takes them all, for a
+        marker with noise pulls what is learnt towards the mean.
     threads : int, optional
         Threads; all available ones by default. Does not change the result.
     """
@@ -215,7 +219,9 @@ def wall_markers(
     distance = np.zeros((len(who), n_walls))
     for w, wall in enumerate(packing.walls):
         distance[:, w] = wall_distance(packing, wall, who)
-    lines_of = _lines_of(packing, who, distance, low, high, chord)
+    lines_of = np.full(len(who), N_LINES)
+    if sparing:
+        lines_of = _lines_of(packing, who, distance, low, high, chord)
     blocks = [
         (part, int(n))
         for n in np.unique(lines_of)

@@ -1,16 +1,18 @@
-// {{ name }}: view factor F_ij from sphere i to sphere j, with its own standard error.
+// {{ name }}: {{ quantity.title }}, with its own standard error.
 // Written by greybed {{ meta.greybed_version }}; hash {{ meta.hash }}.
 // SPDX-License-Identifier: {{ licence }}
 //
-//   F_ij = F_exact(r_i, r_j, d) V,   V = 1 - gate (1 - v),   0 < v < 1
+//   {{ quantity.law[0] }}
 //
-// F_exact is the unobstructed factor; v is learnt ({{ kind }}); gate is exactly 0, so V = 1, where
-// nothing stands between the spheres. Markers, all dimensionless, in this order:
+{% for line in quantity.law[1:] %}
+// {{ line }}
+{% endfor %}
+// The learnt part is of the kind {{ kind }}. Markers, all dimensionless, in this order:
 {% for marker in markers %}
 //   {{ "%-22s"|format(marker.name) }}{{ marker.meaning }}, in {{ allowed(marker) }}
 {% endfor %}
-// Outside these ranges, or where the spheres overlap by more than 5 %, all results are NaN. With
-// -ffast-math the compiler assumes that no NaN comes in: check your markers before.
+// Outside these ranges{{ ", or where the spheres overlap by more than 5 %," if of_pairs }} all results are NaN.
+// With -ffast-math the compiler assumes that no NaN comes in: check your markers before.
 //
 // C++11 or later, no heap, no threads, no state: call it from as many threads as you like.
 #ifndef {{ guard }}
@@ -52,6 +54,7 @@ inline const {{ table.ctype }}* {{ table.name }}() {
 }
 
 {% endfor %}
+{% if of_pairs %}
 /// Unobstructed factor: 32-node Gauss-Jacobi rule, relative error below 1e-11.
 inline double pair_factor(double over_distance, double ratio) {
   const double other = over_distance / ratio;
@@ -67,13 +70,18 @@ inline double pair_factor(double over_distance, double ratio) {
   return over_distance * over_distance * total;
 }
 
+{% endif %}
 {% set typed = "double " ~ markers|map(attribute="name")|join(", double ") %}
 {% set names = markers|map(attribute="name")|join(", ") %}
-/// Whether all markers lie in their ranges and the spheres do not overlap by more than 5 %.
+/// Whether all markers lie in their ranges{{ " and the spheres do not overlap by more than 5 %" if of_pairs }}.
 {% filter wrapped %}
 inline bool in_range({{ typed }}) {
 {% endfilter %}
+{% if of_pairs %}
   bool sound = radius_over_distance * (1.0 + 1.0 / radius_ratio) <= {{ reach }};
+{% else %}
+  bool sound = true;
+{% endif %}
 {% for marker in markers %}
   sound = sound && {{ marker.name }} {{ ">" if marker.low_open else ">=" }} {{ marker.low }} && {{ marker.name }} <= {{ marker.high if marker.high < 1e300 else largest }};
 {% endfor %}
@@ -234,8 +242,30 @@ inline bool close(double value, double expected) {
 
 }  // namespace detail
 
-/// View factor, standard error of the closure, and whether the markers lie outside its training
-/// data (never where nothing stands between: the exact law holds there).
+{% if not of_pairs %}
+namespace detail {
+/// Solid angle of the rectangle from the foot of the centre to a corner, signed [sr].
+inline double corner(double a, double b, double height) {
+  const double far = 1e15 * height;  // in place of an infinite edge
+  a = a > far ? far : (a < -far ? -far : a);
+  b = b > far ? far : (b < -far ? -far : b);
+  return std::atan2(a * b, height * std::sqrt(a * a + b * b + height * height));
+}
+}  // namespace detail
+
+/// wall_share of a flat rectangle, exact: edges along its two sides from the foot of the sphere's
+/// centre, and the distance of the centre from the plane, at least the radius (any one unit). Very
+/// long edges make a half plane; with all four, an infinite plane, it is 1/2.
+inline double rectangle_share(double low_a, double high_a, double low_b, double high_b,
+                              double height) {
+  const double angle = detail::corner(high_a, high_b, height) - detail::corner(low_a, high_b, height) -
+                       detail::corner(high_a, low_b, height) + detail::corner(low_a, low_b, height);
+  return angle / 12.566370614359172;
+}
+
+{% endif %}
+/// {{ quantity.title|capital }}, standard error of the closure, and whether the markers lie outside
+/// its training data (never where the law is exact, with the gate at 0).
 {% filter wrapped %}
 inline void predict({{ typed }}, double& factor, double& stderr_, bool& extrapolates) {
 {% endfilter %}
@@ -244,14 +274,17 @@ inline void predict({{ typed }}, double& factor, double& stderr_, bool& extrapol
     extrapolates = true;
     return;
   }
+{% for line in formulae.before %}
+{% filter wrapped %}
+  {{ line }}
+{% endfilter %}
+{% endfor %}
   // {{ features|map("first")|join("; ") }}
   double features[{{ features|length }}];
 {% for label, formula in features %}
   features[{{ loop.index0 }}] = {{ formula }};
 {% endfor %}
-{% if formulae.before %}
-  {{ formulae.before }}
-{% endif %}
+  const double exact = {{ formulae.exact }};
   const double clear = {{ formulae.clear }};  // 1 - gate
   const double gate = {{ formulae.gate }};
   double raw[2];
@@ -264,14 +297,13 @@ inline void predict({{ typed }}, double& factor, double& stderr_, bool& extrapol
   const double share = raw[0];
   const double error = raw[1];
 {% endif %}
-  const double exact = detail::pair_factor(radius_over_distance, radius_ratio);
   // 1 - gate (1 - v) without the cancellation where v is small
   factor = exact * (clear + gate * share);
   stderr_ = exact * gate * error;
   extrapolates = gate > 0.0 && detail::outside(features);
 }
 
-/// View factor F_ij [-].
+/// {{ quantity.title|capital }} [-].
 {% filter wrapped %}
 inline double evaluate({{ typed }}) {
 {% endfilter %}
@@ -284,7 +316,7 @@ inline double evaluate({{ typed }}) {
   return factor;
 }
 
-/// View factors of n pairs.
+/// The same of n rows.
 {% filter wrapped %}
 inline void evaluate_batch(std::size_t n, const double* {{ markers|map(attribute="name")|join(", const double* ") }}, double* factor) {
 {% endfilter %}

@@ -3,7 +3,7 @@
 //
 //   {{ name }}_test                    says name, hash and self-test; exit code 1 if that fails
 //   {{ name }}_test rows < in.csv      header line of marker names, then numbers, to
-//                                      view_factor,stderr,extrapolates
+//                                      {{ quantity.output }},stderr,extrapolates
 #include "{{ name }}.hpp"
 
 #include <cstdio>
@@ -20,7 +20,7 @@ static int evaluate_rows() {
     std::fprintf(stderr, "the first line must be %s\n", closure::markers());
     return 2;
   }
-  std::printf("view_factor,stderr,extrapolates\n");
+  std::printf("{{ quantity.output }},stderr,extrapolates\n");
   for (long row = 1; std::fgets(line, sizeof line, stdin) != NULL; ++row) {
     double marker[{{ markers|length }}];
     char* at = line;
