@@ -1,0 +1,230 @@
+"""Compiled time steps: velocity Verlet over blocks of particles, until a list has to be renewed."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit, prange
+
+from greybed.dem._pairs import block_forces
+from greybed.dem._walls import move, wall_forces
+
+_OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+# Why the steps ended.
+DONE, RENEW, LOST = 0, 1, 2
+
+
+class State(NamedTuple):
+    """Particles in the order of their places."""
+
+    place: np.ndarray  # (n, 4): centre and radius [m]
+    motion: np.ndarray  # (n, 8): velocity [m/s], spin [1/s], mass [kg], moment of inertia [kg m2]
+    load: np.ndarray  # (n, 8): force [N], torque [N m]; two spare, a line of the cache each
+    kind: np.ndarray  # (n,) int64, material
+    listed: np.ndarray  # (n, 3): centre when the lists were made [m]
+    fixed: np.ndarray  # (n,) bool: moves on as it does, whatever the force
+
+
+class Near(NamedTuple):
+    """Pairs and their histories."""
+
+    first: np.ndarray  # (n + 1,) int64
+    partner: np.ndarray  # (m,) int32
+    shift: np.ndarray  # (m,) uint8, image of the partner
+    touch: np.ndarray  # (m,) uint8, whether in contact
+    history: np.ndarray  # (m, columns)
+    slot: np.ndarray  # (m,) int32, row of ``crossing``, or -1
+    crossing: np.ndarray  # (slots, 6): force and torque on particles of later blocks
+    into: np.ndarray  # (n + 1,) int64
+    slots: np.ndarray  # (slots,) int32, rows of ``crossing`` that act on each particle
+    block: np.ndarray  # (blocks + 1,) int64, first particle of each block
+
+
+class Surfaces(NamedTuple):
+    """Walls, and the particles near them."""
+
+    kinds: np.ndarray  # (s,) int64
+    data: np.ndarray  # (s, 13)
+    wall: np.ndarray  # (s,) int64, wall that a surface belongs to
+    motion: np.ndarray  # (walls, 9): velocity [m/s], spin [1/s], centre [m]
+    kind: np.ndarray  # (walls,) int64, material
+    first: np.ndarray  # (n + 1,) int64
+    surface: np.ndarray  # (m,) int32
+    touch: np.ndarray  # (m,) uint8
+    history: np.ndarray  # (m, columns)
+    force: np.ndarray  # (blocks, walls, 6): force [N] and torque about the centre [N m]
+
+
+class Law(NamedTuple):
+    """Contact laws, as codes and tables."""
+
+    normal: int
+    rolling: int
+    cohesion: int
+    limit: bool
+    row: np.ndarray  # (kinds, kinds) int64, row of ``table`` of two materials
+    table: np.ndarray  # (pairs, COLUMNS)
+
+
+@njit(**_OPTIONS)
+def _kick_and_drift(begin, end, state, near, push, dt, finish, start, worst):
+    """Second half of one step's kick and first half of the next one's, with the way between.
+
+    ``worst`` takes the largest square of the way since the lists were made, and whose it is.
+    """
+    # Flat: numba multiplies by strides at each access of two indices.
+    place, motion = state.place.reshape(-1), state.motion.reshape(-1)
+    load, listed, fixed = state.load.reshape(-1), state.listed.reshape(-1), state.fixed
+    into, slots, crossing = near.into, near.slots, near.crossing
+    halves = finish + start
+    half = 0.5 * dt
+    gx, gy, gz = half * push[0], half * push[1], half * push[2]
+    largest, who = 0.0, -1
+    for i in range(begin, end):
+        p, m = np.uint64(4 * i), np.uint64(8 * i)
+        if finish:
+            for k in range(into[i], into[i + 1]):
+                for c in range(6):
+                    load[8 * i + c] += crossing[slots[k], c]
+        vx, vy, vz = motion[m], motion[m + np.uint64(1)], motion[m + np.uint64(2)]
+        if not fixed[i]:
+            kick, spin = half / motion[m + np.uint64(6)], half / motion[m + np.uint64(7)]
+            ax = kick * load[m] + gx
+            ay = kick * load[m + np.uint64(1)] + gy
+            az = kick * load[m + np.uint64(2)] + gz
+            bx = spin * load[m + np.uint64(3)]
+            by = spin * load[m + np.uint64(4)]
+            bz = spin * load[m + np.uint64(5)]
+            wx, wy, wz = (
+                motion[m + np.uint64(3)],
+                motion[m + np.uint64(4)],
+                motion[m + np.uint64(5)],
+            )
+            # Twice half a kick, not once a whole one: a run in two parts ends with the same bits.
+            for _ in range(halves):
+                vx, vy, vz = vx + ax, vy + ay, vz + az
+                wx, wy, wz = wx + bx, wy + by, wz + bz
+            motion[m], motion[m + np.uint64(1)], motion[m + np.uint64(2)] = vx, vy, vz
+            motion[m + np.uint64(3)] = wx
+            motion[m + np.uint64(4)] = wy
+            motion[m + np.uint64(5)] = wz
+        if start:
+            x, y, z = (
+                place[p] + dt * vx,
+                place[p + np.uint64(1)] + dt * vy,
+                place[p + np.uint64(2)] + dt * vz,
+            )
+            place[p], place[p + np.uint64(1)], place[p + np.uint64(2)] = x, y, z
+            dx = x - listed[3 * i]
+            dy = y - listed[3 * i + 1]
+            dz = z - listed[3 * i + 2]
+            square = dx * dx + dy * dy + dz * dz
+            for c in range(6):
+                load[m + np.uint64(c)] = 0.0
+            if not square <= largest:  # also where it is not a number
+                largest, who = square, i
+                if square != square:
+                    break
+    worst[0], worst[1] = largest, who
+
+
+@njit(parallel=True, **_OPTIONS)
+def _kicks_of_blocks(state, near, push, dt, finish, start, worst):
+    block = near.block
+    for b in prange(block.size - 1):
+        _kick_and_drift(block[b], block[b + 1], state, near, push, dt, finish, start, worst[b])
+
+
+@njit(**_OPTIONS)
+def _kicks(state, near, push, dt, finish, start, worst):
+    # To wake threads for a single block takes longer than its step.
+    if near.block.size == 2:
+        _kick_and_drift(
+            near.block[0], near.block[1], state, near, push, dt, finish, start, worst[0]
+        )
+    else:
+        _kicks_of_blocks(state, near, push, dt, finish, start, worst)
+
+
+@njit(**_OPTIONS)
+def _forces_of_block(b, state, near, surfaces, law, edge, periodic, dt, count):
+    begin, end = near.block[b], near.block[b + 1]
+    block_forces(
+        begin, end, state.place, state.motion, state.load, state.kind,
+        near.first, near.partner, near.shift, near.touch, near.history, near.slot, near.crossing,
+        edge, periodic, law.row, law.table, dt,
+        law.normal, law.rolling, law.cohesion, law.limit, count,
+    )  # fmt: skip
+    if surfaces.kinds.size:
+        surfaces.force[b, :, :] = 0.0
+        wall_forces(
+            begin, end, state.place, state.motion, state.load, state.kind,
+            surfaces.first, surfaces.surface, surfaces.touch, surfaces.history,
+            surfaces.kinds, surfaces.data, surfaces.wall, surfaces.motion, surfaces.kind,
+            surfaces.force[b], law.row, law.table, dt,
+            law.normal, law.rolling, law.cohesion, law.limit,
+        )  # fmt: skip
+
+
+@njit(parallel=True, **_OPTIONS)
+def _forces_of_blocks(state, near, surfaces, law, edge, periodic, dt, count):
+    for b in prange(near.block.size - 1):
+        _forces_of_block(np.int64(b), state, near, surfaces, law, edge, periodic, dt, count[b])
+
+
+# Numbers with a type of their own, not literals: each literal would be compiled once more.
+@njit(**_OPTIONS)
+def forces(state, near, surfaces, law, edge, periodic, dt, count):
+    """Forces of the present places; those across blocks wait in ``near.crossing``."""
+    if near.block.size == 2:
+        _forces_of_block(np.int64(0), state, near, surfaces, law, edge, periodic, dt, count[0])
+    else:
+        _forces_of_blocks(state, near, surfaces, law, edge, periodic, dt, count)
+
+
+@njit(**_OPTIONS)
+def advance(
+    steps, state, near, surfaces, law, edge, periodic, push, dt, skin, wall_pace, wall_way,
+    pending, worst, count,
+):  # fmt: skip
+    """Up to ``steps`` steps; returns those done, why it ended, and the particle that was at fault.
+
+    ``pending`` says that the loads are of the present places but not yet in the velocities: so it
+    is after a step, and where lists were renewed between the way and the forces.
+    """
+    blocks = near.block.size - 1
+    for step in range(steps):
+        _kicks(state, near, push, dt, np.int64(pending), np.int64(1), worst)
+        pending = True
+        largest, who = 0.0, -1
+        for b in range(blocks):
+            # Also where it is no number, and then for good.
+            if not worst[b, 0] <= largest and largest == largest:
+                largest, who = worst[b, 0], np.int64(worst[b, 1])
+        moving = wall_pace > 0.0
+        if moving:
+            move(surfaces.kinds, surfaces.data, surfaces.wall, surfaces.motion, dt)
+            wall_way += wall_pace * dt
+        if not largest < np.inf:
+            return step, LOST, who, wall_way
+        if 2.0 * np.sqrt(largest) > skin - wall_way:
+            return step, RENEW, who, wall_way
+        forces(state, near, surfaces, law, edge, periodic, dt, count)
+    return steps, DONE, -1, wall_way
+
+
+@njit(**_OPTIONS)
+def gather(state, near):
+    """Add to the loads what waits in ``near.crossing``, and leave nothing there."""
+    for i in range(near.into.size - 1):
+        for m in range(near.into[i], near.into[i + 1]):
+            for c in range(6):
+                state.load[i, c] += near.crossing[near.slots[m], c]
+    near.crossing[:, :] = 0.0
+
+
+@njit(**_OPTIONS)
+def finish(state, near, push, dt, worst):
+    """The second half of the last step's kick."""
+    _kicks(state, near, push, dt, np.int64(1), np.int64(0), worst)
+    near.crossing[:, :] = 0.0

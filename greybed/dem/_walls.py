@@ -1,0 +1,375 @@
+"""Compiled walls: the nearest point of each kind, and forces on the particles near it."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from greybed.dem import _columns as col
+from greybed.dem._batch import room, solve
+from greybed.dem._cohesion import attraction
+
+_OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+# Kinds of surfaces. Data: a point, an axis or normal, then lengths; triangles hold three corners.
+PLANE, TUBE, CONE, DISC, TRIANGLE = 0, 1, 2, 3, 4
+# Where the nearest point of a surface lies: inside it, on its rim, or nowhere near.
+FACE, RIM, NOWHERE = 0, 1, 2
+MOST_AT_ONCE = 8
+
+
+@njit(**_OPTIONS)
+def nearest(kind, data, x, y, z):
+    """Signed distance from a surface to a point, its normal towards the point, and where it is.
+
+    Surfaces without end give negative distances behind them; others have two sides.
+    """
+    px, py, pz = x - data[0], y - data[1], z - data[2]
+    if kind == PLANE:
+        ax, ay, az = data[3], data[4], data[5]
+        return px * ax + py * ay + pz * az, ax, ay, az, FACE
+    if kind == TRIANGLE:
+        return _nearest_of_triangle(data, x, y, z)
+    ax, ay, az = data[3], data[4], data[5]
+    along = px * ax + py * ay + pz * az
+    rx, ry, rz = px - along * ax, py - along * ay, pz - along * az
+    out = math.sqrt(rx * rx + ry * ry + rz * rz)
+    if out > 0.0:
+        rx, ry, rz = rx / out, ry / out, rz / out
+    elif kind != DISC:
+        # On the axis every direction is as near: any one across it.
+        rx, ry, rz = _across(ax, ay, az)
+    if kind == DISC:
+        if out <= data[6]:
+            side = 1.0 if along >= 0.0 else -1.0
+            return abs(along), side * ax, side * ay, side * az, FACE
+        beyond = out - data[6]
+        d = math.sqrt(along * along + beyond * beyond)
+        return (
+            d, (along * ax + beyond * rx) / d, (along * ay + beyond * ry) / d,
+            (along * az + beyond * rz) / d, RIM,
+        )  # fmt: skip
+    # In the plane through axis and point: from (0, radius) to (length, end radius).
+    length, radius, change = data[8], data[6], data[7] - data[6]
+    if length == math.inf:
+        return radius - out, -rx, -ry, -rz, FACE
+    slant = math.sqrt(length * length + change * change)
+    ua, ur = length / slant, change / slant
+    at = along * ua + (out - radius) * ur
+    if 0.0 <= at <= slant:
+        # Positive where the axis is; what has an end has two sides.
+        d = along * ur - (out - radius) * ua
+        side = 1.0 if d >= 0.0 else -1.0
+        ua, ur = side * ua, side * ur
+        return abs(d), ur * ax - ua * rx, ur * ay - ua * ry, ur * az - ua * rz, FACE
+    end = min(max(at, 0.0), slant)
+    da, dr = along - end * ua, out - radius - end * ur
+    d = math.sqrt(da * da + dr * dr)
+    return (
+        d, (da * ax + dr * rx) / d, (da * ay + dr * ry) / d, (da * az + dr * rz) / d, RIM,
+    )  # fmt: skip
+
+
+@njit(**_OPTIONS)
+def _across(ax, ay, az):
+    if abs(ax) < 0.9:
+        x, y, z = 0.0, az, -ay
+    else:
+        x, y, z = -az, 0.0, ax
+    size = math.sqrt(x * x + y * y + z * z)
+    return x / size, y / size, z / size
+
+
+@njit(**_OPTIONS)
+def _nearest_of_triangle(data, x, y, z):
+    """Nearest point of a triangle by its Voronoi regions (Ericson 2005, section 5.1.5)."""
+    abx, aby, abz = data[3] - data[0], data[4] - data[1], data[5] - data[2]
+    acx, acy, acz = data[6] - data[0], data[7] - data[1], data[8] - data[2]
+    apx, apy, apz = x - data[0], y - data[1], z - data[2]
+    d1 = abx * apx + aby * apy + abz * apz
+    d2 = acx * apx + acy * apy + acz * apz
+    bpx, bpy, bpz = apx - abx, apy - aby, apz - abz
+    d3 = abx * bpx + aby * bpy + abz * bpz
+    d4 = acx * bpx + acy * bpy + acz * bpz
+    cpx, cpy, cpz = apx - acx, apy - acy, apz - acz
+    d5 = abx * cpx + aby * cpy + abz * cpz
+    d6 = acx * cpx + acy * cpy + acz * cpz
+    v, w, where = 0.0, 0.0, RIM
+    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    if d1 <= 0.0 and d2 <= 0.0:
+        pass
+    elif d3 >= 0.0 and d4 <= d3:
+        v = 1.0
+    elif d6 >= 0.0 and d5 <= d6:
+        w = 1.0
+    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+        v = d1 / (d1 - d3)
+    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+        w = d2 / (d2 - d6)
+    elif va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
+        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+        v = 1.0 - w
+    else:
+        total = va + vb + vc
+        v, w, where = vb / total, vc / total, FACE
+    qx = apx - v * abx - w * acx
+    qy = apy - v * aby - w * acy
+    qz = apz - v * abz - w * acz
+    d = math.sqrt(qx * qx + qy * qy + qz * qz)
+    if d == 0.0:
+        nx, ny, nz = aby * acz - abz * acy, abz * acx - abx * acz, abx * acy - aby * acx
+        size = math.sqrt(nx * nx + ny * ny + nz * nz)
+        return 0.0, nx / size, ny / size, nz / size, where
+    return d, qx / d, qy / d, qz / d, where
+
+
+@njit(**_OPTIONS)
+def move(kinds, data, wall, wall_motion, dt):
+    """Surfaces moved on by one step: turned about the centre of their wall, and shifted."""
+    for s in range(kinds.size):
+        m = wall_motion[wall[s]]
+        still = True
+        for c in range(6):
+            still = still and m[c] == 0.0
+        if still:
+            continue
+        _carry(m, dt, data[s, 0:3], True)
+        _carry(m, dt, data[s, 10:13], True)
+        if kinds[s] == TRIANGLE:
+            _carry(m, dt, data[s, 3:6], True)
+            _carry(m, dt, data[s, 6:9], True)
+        else:
+            _carry(m, dt, data[s, 3:6], False)
+    for w in range(wall_motion.shape[0]):
+        for c in range(3):
+            wall_motion[w, 6 + c] += dt * wall_motion[w, c]
+
+
+@njit(**_OPTIONS)
+def _carry(m, dt, vector, point):
+    """A point, or a direction, of a moving body, by Rodrigues' formula."""
+    rate = math.sqrt(m[3] * m[3] + m[4] * m[4] + m[5] * m[5])
+    x, y, z = vector[0], vector[1], vector[2]
+    if point:
+        x, y, z = x - m[6], y - m[7], z - m[8]
+    if rate > 0.0:
+        ax, ay, az = m[3] / rate, m[4] / rate, m[5] / rate
+        c, s = math.cos(rate * dt), math.sin(rate * dt)
+        along = (ax * x + ay * y + az * z) * (1.0 - c)
+        x, y, z = (
+            x * c + (ay * z - az * y) * s + ax * along,
+            y * c + (az * x - ax * z) * s + ay * along,
+            z * c + (ax * y - ay * x) * s + az * along,
+        )
+    if point:
+        x, y, z = x + m[6] + dt * m[0], y + m[7] + dt * m[1], z + m[8] + dt * m[2]
+    vector[0], vector[1], vector[2] = x, y, z
+
+
+@njit(**_OPTIONS)
+def list_near(place, kinds, data, skin, first, surface):
+    """Surfaces nearer than ``skin`` to each particle, as :func:`list_pairs` does for pairs."""
+    count = 0
+    for i in range(place.shape[0]):
+        first[i] = count
+        x, y, z, r = place[i, 0], place[i, 1], place[i, 2], place[i, 3]
+        for s in range(kinds.size):
+            # A bounding ball first, for meshes have many triangles.
+            bx, by, bz = x - data[s, 10], y - data[s, 11], z - data[s, 12]
+            ball = data[s, 9] + r + skin
+            if bx * bx + by * by + bz * bz > ball * ball:
+                continue
+            distance = nearest(kinds[s], data[s], x, y, z)[0]
+            if distance < r + skin:
+                if count < surface.size:
+                    surface[count] = s
+                count += 1
+    first[place.shape[0]] = count
+    return count if count <= surface.size else -count
+
+
+@njit(**_OPTIONS)
+def carry_over_walls(
+    order, first, surface, old_first, old_surface, old_touch, old_history, touch, history
+):
+    """Histories of particle and surface from the old list."""
+    for i in range(order.size):
+        a = order[i]
+        for k in range(first[i], first[i + 1]):
+            touch[k] = 0
+            for column in range(history.shape[1]):
+                history[k, column] = 0.0
+            for m in range(old_first[a], old_first[a + 1]):
+                if old_surface[m] == surface[k] and old_touch[m]:
+                    touch[k] = 1
+                    for column in range(history.shape[1]):
+                        history[k, column] = old_history[m, column]
+
+
+@njit(**_OPTIONS)
+def wall_forces(
+    begin, end, place, motion, load, kind, first, surface, touch, history,
+    kinds, data, wall, wall_motion, wall_kind, on_wall, row, table, dt,
+    normal, rolling, cohesion, limit,
+):  # fmt: skip
+    """Forces of surfaces on particles ``begin`` to ``end - 1``; ``on_wall`` collects the sums.
+
+    A wall is one surface or a mesh of them. Where a particle touches several triangles of a mesh,
+    faces count first; a rim counts where it is not part of such a face and not met before.
+    """
+    work, who = room(table)
+    one = table.shape[0] == 1
+    filled = np.int64(0)
+    seen = np.empty((MOST_AT_ONCE, 7))
+    met = np.empty(MOST_AT_ONCE, np.int64)
+    for i in range(begin, end):
+        if first[i] == first[i + 1]:
+            continue
+        x, y, z, r = place[i, 0], place[i, 1], place[i, 2], place[i, 3]
+        mass = motion[i, 6]
+        number = 0
+        for turn in range(2):
+            for k in range(first[i], first[i + 1]):
+                s = surface[k]
+                if turn == 1 and kinds[s] == PLANE:
+                    continue
+                distance, nx, ny, nz, where = nearest(kinds[s], data[s], x, y, z)
+                if (where == FACE) != (turn == 0):
+                    continue
+                w = wall[s]
+                p = row[kind[i], wall_kind[w]]
+                overlap = r - distance
+                if overlap <= 0.0:
+                    if touch[k]:
+                        touch[k] = 0
+                        forget(history, k)
+                    if cohesion == col.VAN_DER_WAALS:
+                        pull = attraction(-overlap, r, table, p)
+                        load[i, 0] -= pull * nx
+                        load[i, 1] -= pull * ny
+                        load[i, 2] -= pull * nz
+                    continue
+                qx, qy, qz = x - distance * nx, y - distance * ny, z - distance * nz
+                if turn == 1 and _part_of(seen, met, number, wall, s, qx, qy, qz, r):
+                    if touch[k]:
+                        touch[k] = 0
+                        forget(history, k)
+                    continue
+                if not touch[k]:
+                    _take_over(first[i], first[i + 1], k, surface, wall, kinds, data,
+                               x, y, z, r, touch, history)  # fmt: skip
+                touch[k] = 1
+                if number < MOST_AT_ONCE:
+                    met[number] = s
+                    seen[number, 0], seen[number, 1], seen[number, 2] = qx, qy, qz
+                    seen[number, 3], seen[number, 4], seen[number, 5] = nx, ny, nz
+                    seen[number, 6] = where
+                    number += 1
+                m = wall_motion[w]
+                c = filled
+                who[c], who[c + col.SIZE], who[c + 2 * col.SIZE] = i, w, k
+                work[col.NX, c], work[col.NY, c], work[col.NZ, c], work[col.OVERLAP, c] = (
+                    nx,
+                    ny,
+                    nz,
+                    overlap,
+                )
+                # Velocity relative to the wall at the contact.
+                lx, ly, lz = qx - m[6], qy - m[7], qz - m[8]
+                work[col.UX, c] = motion[i, 0] - (m[0] + m[4] * lz - m[5] * ly)
+                work[col.UY, c] = motion[i, 1] - (m[1] + m[5] * lx - m[3] * lz)
+                work[col.UZ, c] = motion[i, 2] - (m[2] + m[3] * ly - m[4] * lx)
+                work[col.IX, c], work[col.IY, c], work[col.IZ, c] = (
+                    motion[i, 3],
+                    motion[i, 4],
+                    motion[i, 5],
+                )
+                work[col.JX, c], work[col.JY, c], work[col.JZ, c] = m[3], m[4], m[5]
+                work[col.R_EFF, c], work[col.M_EFF, c], work[col.INERTIA, c] = r, mass, mass * r * r
+                work[col.ARM_I, c], work[col.ARM_J, c] = r - 0.5 * overlap, 0.0
+                work[col.AREA, c] = math.pi * (r * r - distance * distance)
+                for column in range(history.shape[1]):
+                    work[col.SX + column, c] = history[k, column]
+                if not one:
+                    for column in range(col.COLUMNS):
+                        work[column, c] = table[p, column]
+                filled += 1
+                if filled == col.SIZE:
+                    solve(work, filled, dt, normal, rolling, cohesion, limit)
+                    _carry_out(
+                        work, who, filled, place, load, history, wall_motion, rolling, on_wall
+                    )
+                    filled = np.int64(0)
+    if filled:
+        solve(work, filled, dt, normal, rolling, cohesion, limit)
+        _carry_out(work, who, filled, place, load, history, wall_motion, rolling, on_wall)
+
+
+@njit(**_OPTIONS)
+def _carry_out(work, who, n, place, load, history, wall_motion, rolling, on_wall):
+    """Forces of a batch, on particles and walls."""
+    for c in range(n):
+        i, w, k = who[c], who[c + col.SIZE], who[c + 2 * col.SIZE]
+        for column in range(history.shape[1]):
+            history[k, column] = work[col.SX + column, c]
+        fx, fy, fz = work[col.FX, c], work[col.FY, c], work[col.FZ, c]
+        tx, ty, tz = 0.0, 0.0, 0.0
+        if rolling != col.NO_ROLLING:
+            tx, ty, tz = work[col.RX, c], work[col.RY, c], work[col.RZ, c]
+        arm = work[col.ARM_I, c]
+        load[i, 0] += fx
+        load[i, 1] += fy
+        load[i, 2] += fz
+        load[i, 3] -= arm * work[col.BX, c] + tx
+        load[i, 4] -= arm * work[col.BY, c] + ty
+        load[i, 5] -= arm * work[col.BZ, c] + tz
+        away = place[i, 3] - work[col.OVERLAP, c]
+        lx = place[i, 0] - away * work[col.NX, c] - wall_motion[w, 6]
+        ly = place[i, 1] - away * work[col.NY, c] - wall_motion[w, 7]
+        lz = place[i, 2] - away * work[col.NZ, c] - wall_motion[w, 8]
+        on_wall[w, 0] -= fx
+        on_wall[w, 1] -= fy
+        on_wall[w, 2] -= fz
+        on_wall[w, 3] += lz * fy - ly * fz + tx
+        on_wall[w, 4] += lx * fz - lz * fx + ty
+        on_wall[w, 5] += ly * fx - lx * fy + tz
+
+
+@njit(**_OPTIONS)
+def forget(history, k):
+    """Springs of a contact that has ended."""
+    for column in range(history.shape[1]):
+        history[k, column] = 0.0
+
+
+@njit(**_OPTIONS)
+def _part_of(seen, met, number, wall, s, qx, qy, qz, r):
+    """Whether a point on a rim belongs to a surface of the same wall that counted already."""
+    for m in range(number):
+        if wall[met[m]] != wall[s]:
+            continue
+        dx, dy, dz = qx - seen[m, 0], qy - seen[m, 1], qz - seen[m, 2]
+        if seen[m, 6] == FACE:
+            if abs(dx * seen[m, 3] + dy * seen[m, 4] + dz * seen[m, 5]) < 1e-6 * r:
+                return True
+        elif dx * dx + dy * dy + dz * dz < 1e-12 * r * r:
+            return True
+    return False
+
+
+@njit(**_OPTIONS)
+def _take_over(low, high, k, surface, wall, kinds, data, x, y, z, r, touch, history):
+    """Springs that a particle brings from the triangle it has just left, within one mesh."""
+    if kinds[surface[k]] != TRIANGLE:
+        return
+    for m in range(low, high):
+        if m == k or not touch[m] or wall[surface[m]] != wall[surface[k]]:
+            continue
+        distance, _, _, _, where = nearest(kinds[surface[m]], data[surface[m]], x, y, z)
+        if where == FACE and distance < r:
+            continue  # still in contact of its own
+        for column in range(history.shape[1]):
+            history[k, column] = history[m, column]
+        touch[m] = 0
+        forget(history, m)
+        return

@@ -1,0 +1,215 @@
+"""Lists of near pairs and walls: made, renewed where particles have moved, histories kept."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from greybed.core.errors import InputError
+from greybed.dem import _neighbours, _step, _walls
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+# Particles of a block: enough work for a thread, little enough to stay in its cache.
+BLOCK = 2048
+# Cells over particles at most, for a few particles in a wide space.
+MOST_CELLS = 8
+
+
+class Lists:
+    """Everything that depends on who is near whom.
+
+    Attributes
+    ----------
+    state : State
+        Particles, sorted by place at each :meth:`renew`.
+    ident : (n,) int array
+        Numbers of the input in this order.
+    near, surfaces
+        Lists for the compiled steps.
+    skin, reach : float
+        Gap up to which pairs are listed, and up to which they attract each other [m].
+    wall_pace, wall_way : float
+        Highest speed of a wall's surface [m/s] and its way since the lists were made [m].
+    """
+
+    def __init__(
+        self,
+        state: _step.State,
+        walls: tuple[Index, Array, Index, Array],
+        wall_kind: Index,
+        columns: int,
+        box: ArrayLike | None,
+        periodic: tuple[bool, bool, bool],
+        skin: float,
+        reach: float,
+    ) -> None:
+        n = len(state.place)
+        self.state = state
+        self.ident = np.arange(n)
+        self.skin, self.reach, self.columns = skin, reach, columns
+        self.periodic = np.array(periodic, dtype=bool)
+        self.wraps = bool(self.periodic.any())
+        self.box = self._checked_box(box)
+        # Only along periodic axes is it used; elsewhere no image is ever shifted.
+        self.edge = np.where(self.periodic, self.box[1] - self.box[0], 0.0)
+        if not skin > reach:
+            raise InputError(f"skin = {skin - reach:g} [m] must be above 0.")
+        blocks = max(1, round(n / BLOCK))
+        block = np.empty(blocks + 1, np.int64)
+        _neighbours.blocks_of(n, BLOCK, block)
+        self.near = _step.Near(
+            np.zeros(n + 1, np.int64), *_pairs(0, columns), np.zeros((0, 6)),
+            np.zeros(n + 1, np.int64), np.zeros(0, np.int32), block,
+        )  # fmt: skip
+        kinds, data, wall, motion = walls
+        self.surfaces = _step.Surfaces(
+            kinds, data, wall, motion, wall_kind, np.zeros(n + 1, np.int64),
+            np.zeros(0, np.int32), np.zeros(0, np.uint8), np.zeros((0, columns)),
+            np.zeros((blocks, len(motion), 6)),
+        )  # fmt: skip
+        self.worst = np.zeros((blocks, 2))
+        self.count = np.zeros((blocks, 3))
+        self.wall_way = 0.0
+        self.wall_pace = self._pace()
+
+    def _checked_box(self, box: ArrayLike | None) -> Array:
+        if box is None:
+            if self.wraps:
+                raise InputError("a periodic simulation needs a box [m]; give its two corners.")
+            return np.array([[-np.inf] * 3, [np.inf] * 3])
+        given = np.array(box, dtype=np.float64)
+        if given.shape != (2, 3) or not (given[1] > given[0]).all():
+            raise InputError(f"box = {given.tolist()} must be a lower and an upper corner [m].")
+        cell = 2.0 * float(self.state.place[:, 3].max()) + self.skin
+        edge = given[1] - given[0]
+        for axis in np.flatnonzero(self.periodic):
+            if edge[axis] < 3.0 * cell:
+                raise InputError(
+                    f"the box is {edge[axis]:g} [m] long along {'xyz'[axis]}, less than three "
+                    f"times the largest diameter and the skin, {3.0 * cell:g}; take a longer one."
+                )
+        return given
+
+    def _pace(self) -> float:
+        """Highest speed at which a surface may come nearer to a particle [m/s]."""
+        s, pace = self.surfaces, 0.0
+        for k in range(len(s.kinds)):
+            m = s.motion[s.wall[k]]
+            spin, axis = float(np.linalg.norm(m[3:6])), s.data[k, 3:6]
+            turned = s.kinds[k] != _walls.TRIANGLE and np.allclose(
+                np.cross(axis, m[3:6]), 0.0, atol=1e-12 * max(spin, 1e-300)
+            )
+            away = m[6:9] - s.data[k, :3]
+            if turned:  # about its own axis or normal: no nearer, if the axis goes through it
+                across = away - (away @ axis) * axis
+                turned = s.kinds[k] == _walls.PLANE or float(np.linalg.norm(across)) == 0.0
+            far = float(np.linalg.norm(s.data[k, 10:13] - m[6:9])) + min(s.data[k, 9], 1e300)
+            if math.isinf(s.data[k, 9]):
+                place = self.state.place[:, :3] - m[6:9]
+                far = 2.0 * float(np.sqrt((place**2).sum(axis=1)).max())
+            pace = max(pace, float(np.linalg.norm(m[:3])) + (0.0 if turned else spin * far))
+        return pace
+
+    def renew(self) -> None:
+        """Sort the particles by place and list anew who is near whom."""
+        old, near = self.state, self.near
+        place = old.place
+        if self.wraps:
+            _neighbours.wrap(place, self.box[0], self.edge, self.periodic)
+        n = len(place)
+        low, inverse, shape = self._grid(place)
+        cell, key = np.empty(n, np.int64), np.empty(n, np.int64)
+        _neighbours.cells_of(place, low, inverse, shape, cell)
+        _neighbours.morton_keys(cell, shape, key)
+        # Equal cells keep their order, so that equal states give equal orders.
+        order = np.argsort(key, kind="stable")
+        self.ident = self.ident[order]
+        place, cell = place[order], cell[order]
+        self.state = _step.State(
+            place, old.motion[order], old.load[order], old.kind[order], place[:, :3].copy(),
+            old.fixed[order],
+        )  # fmt: skip
+        self._renew_pairs(near, order, cell, shape)
+        self._renew_surfaces(order)
+        self.wall_way = 0.0
+
+    def _grid(self, place: Array) -> tuple[Array, Array, Index]:
+        low = np.where(self.periodic, self.box[0], place[:, :3].min(axis=0))
+        high = np.where(self.periodic, self.box[1], place[:, :3].max(axis=0))
+        cell = 2.0 * float(place[:, 3].max()) + self.skin
+        edge = np.maximum(high - low, cell)
+        most = MOST_CELLS * len(place) + 1000
+        cell = max(cell, float(edge.prod() / most) ** (1.0 / 3.0))
+        shape = np.maximum((edge / cell).astype(np.int64), 1)
+        if self.wraps:
+            shape = np.where(self.periodic, np.maximum(shape, 3), shape)
+        return low, shape / edge, shape
+
+    def _renew_pairs(self, near: _step.Near, order: Index, cell: Index, shape: Index) -> None:
+        place = self.state.place
+        n = len(place)
+        start, member = np.empty(int(shape.prod()) + 1, np.int64), np.empty(n, np.int64)
+        _neighbours.fill_cells(cell, start, member)
+        first = np.empty(n + 1, np.int64)
+        room = max(len(near.partner), 6 * n)
+        while True:
+            partner, shift = np.empty(room, np.int32), np.empty(room, np.uint8)
+            found = _neighbours.list_pairs(
+                place, cell, start, member, shape, self.periodic, self.edge, self.skin, first,
+                partner, shift,
+            )  # fmt: skip
+            if found >= 0:
+                break
+            room = -found + -found // 20
+        _, _, touch, history, slot = _pairs(found, self.columns)
+        # Copies, so that the room for the longest list so far is not kept twice.
+        partner, shift = partner[:found].copy(), shift[:found].copy()
+        _neighbours.carry_over(
+            order, first, partner, near.first, near.partner, near.touch, near.history, touch,
+            history,
+        )  # fmt: skip
+        into, slots = np.empty(n + 1, np.int64), np.empty(found, np.int32)
+        crossings = _neighbours.list_crossings(near.block, first, partner, slot, into, slots)
+        self.near = _step.Near(
+            first, partner, shift, touch, history, slot, np.zeros((crossings, 6)), into,
+            slots[:crossings].copy(), near.block,
+        )  # fmt: skip
+
+    def _renew_surfaces(self, order: Index) -> None:
+        s = self.surfaces
+        if not len(s.kinds):
+            return
+        place = self.state.place
+        first = np.empty(len(place) + 1, np.int64)
+        room = max(len(s.surface), len(place))
+        while True:
+            surface = np.empty(room, np.int32)
+            found = _walls.list_near(place, s.kinds, s.data, self.skin, first, surface)
+            if found >= 0:
+                break
+            room = -found + -found // 20
+        surface = surface[:found].copy()
+        touch, history = np.empty(found, np.uint8), np.empty((found, self.columns))
+        _walls.carry_over_walls(
+            order, first, surface, s.first, s.surface, s.touch, s.history, touch, history
+        )
+        self.surfaces = s._replace(first=first, surface=surface, touch=touch, history=history)
+
+    @property
+    def bytes(self) -> int:
+        """Memory of state and lists [B]."""
+        parts = (*self.state, *self.near, *self.surfaces, self.ident)
+        return sum(part.nbytes for part in parts)
+
+
+def _pairs(
+    count: int, columns: int
+) -> tuple[NDArray[np.int32], NDArray[np.uint8], NDArray[np.uint8], Array, NDArray[np.int32]]:
+    return (
+        np.empty(count, np.int32), np.empty(count, np.uint8), np.empty(count, np.uint8),
+        np.empty((count, columns)), np.empty(count, np.int32),
+    )  # fmt: skip

@@ -1,0 +1,348 @@
+"""Simulation of particles in contact: state, time steps, what comes out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from greybed.core.errors import InputError
+from greybed.core.processors import available_threads
+from greybed.dem import _columns, _step
+from greybed.dem.laws import COHESION, NORMAL, ROLLING, ContactLaw
+from greybed.dem.lists import Lists
+from greybed.dem.materials import Contact, Material, pair_tables
+from greybed.dem.particles import Energies, particle_arrays, rayleigh_time
+from greybed.dem.walls import SolidWall, surfaces_of
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+# Share of Rayleigh's time above which contacts are no longer followed [-].
+MOST_OF_RAYLEIGH = 0.4
+GRAVITY = (0.0, 0.0, -9.81)
+
+
+class Simulation:
+    """Spheres that collide, roll and stick, between walls, under gravity.
+
+    Parameters
+    ----------
+    centres : array_like, shape (n, 3)
+        Centres [m].
+    radii : array_like, shape (n,) or number
+        Radii, above 0 [m].
+    materials : sequence of Material, or Material
+        Of particles and walls, with different names.
+    contacts : mapping or Contact
+        By pairs of names, ``{("glass", "steel"): Contact(0.9, 0.3)}``; one for all.
+    kinds : array_like of int, shape (n,), optional
+        Number of each particle's material; the first by default.
+    law : ContactLaw
+        Contact laws.
+    walls : sequence of SolidWall
+        Walls.
+    box : array_like, shape (2, 3), optional
+        Lower and upper corner, for the periodic directions [m].
+    periodic : three bools
+        Directions that repeat; the box must hold three cells of a diameter and the skin there.
+    gravity : three floats
+        Acceleration [m/s2].
+    time_step : float, optional
+        At most 40 % of Rayleigh's time, a tenth of it by default; linear laws must state one [s].
+    velocities, spins : array_like, shape (n, 3), optional
+        At the start, 0 by default [m/s], [1/s].
+    skin : float, optional
+        Pairs nearer than it are listed [m]; a quarter of the mean radius by default.
+    most_overlap : float
+        Overlap over the smaller radius at which a run stops [-].
+    threads : int, optional
+        Threads; all available ones by default. They change no bit.
+
+    Raises
+    ------
+    InputError
+        For numbers out of range, a pair of materials without contact, a time step too large, or
+        particles that overlap deeply.
+
+    Notes
+    -----
+    Velocity Verlet of second order; spins likewise. Forces see velocities half a step on, as in
+    LAMMPS and LIGGGHTS: with damping the order is one.
+    """
+
+    def __init__(
+        self,
+        centres: ArrayLike,
+        radii: ArrayLike,
+        materials: Sequence[Material] | Material,
+        contacts: Mapping[tuple[str, str], Contact] | Contact,
+        *,
+        kinds: ArrayLike | None = None,
+        law: ContactLaw | None = None,
+        walls: Sequence[SolidWall] = (),
+        box: ArrayLike | None = None,
+        periodic: tuple[bool, bool, bool] = (False, False, False),
+        gravity: Sequence[float] = GRAVITY,
+        time_step: float | None = None,
+        velocities: ArrayLike | None = None,
+        spins: ArrayLike | None = None,
+        skin: float | None = None,
+        most_overlap: float = 0.3,
+        threads: int | None = None,
+    ) -> None:
+        place, motion, kind, known = particle_arrays(
+            centres, radii, materials, kinds, velocities, spins
+        )
+        n = len(place)
+        self.law = law or ContactLaw()
+        self.most_overlap = most_overlap
+        self.walls = tuple(walls)
+        self.materials = known
+        names = [material.name for material in known]
+        of_walls = []
+        for wall in walls:
+            name = names[0] if wall.material is None else wall.material
+            if name not in names:
+                raise InputError(
+                    f"wall {wall.shape.name!r}: no material is called {name!r}; there are "
+                    f"{', '.join(names)}."
+                )
+            of_walls.append(names.index(name))
+        self._law = self._tables(contacts, int(kind.max()) + 1, of_walls)
+        self._rayleigh = rayleigh_time(place, kind, known)
+        self.time_step = self._checked_step(time_step)
+        self.gravity = np.array(gravity, dtype=np.float64)
+        if self.gravity.shape != (3,) or not np.isfinite(self.gravity).all():
+            raise InputError(f"gravity = {gravity} must be three finite numbers [m/s2].")
+        self._state = _step.State(
+            place, motion, np.zeros((n, 8)), kind, place[:, :3].copy(), np.zeros(n, bool)
+        )
+        reach = (
+            float(self._law.table[:, _columns.REACH].max())
+            if self.law.cohesion == "van-der-waals"
+            else 0.0
+        )
+        self._lists = Lists(
+            self._state,
+            surfaces_of(walls),
+            np.array(of_walls, np.int64),
+            self.law.columns,
+            box,
+            periodic,
+            (0.25 * float(place[:, 3].mean()) if skin is None else float(skin)) + reach,
+            reach,
+        )
+        self.threads = available_threads() if threads is None else int(threads)
+        if not 1 <= self.threads <= numba.config.NUMBA_NUM_THREADS:
+            raise InputError(
+                f"threads = {self.threads} must lie in 1 ... {numba.config.NUMBA_NUM_THREADS}."
+            )
+        self.steps = 0
+        self._pending = False
+        self._lists.renew()
+        self._state = self._lists.state
+        self._forces()
+        self._check_overlaps()
+        # Loads with what came across blocks, so that the first kick of a run finds them whole.
+        self._gather()
+
+    # -- time -------------------------------------------------------------------------------
+
+    def run(self, steps: int) -> None:
+        """Go on by so many steps.
+
+        Raises
+        ------
+        InputError
+            If a particle is lost, or two overlap too deeply: with the particle, the place, the
+            cause and the remedy. The state is then that of the last good look.
+        """
+        left = int(steps)
+        if left < 0:
+            raise InputError(f"steps = {steps} must be at least 0.")
+        before = numba.get_num_threads()
+        numba.set_num_threads(self.threads)
+        try:
+            self._run(left)
+        finally:
+            numba.set_num_threads(before)
+
+    def _run(self, left: int) -> None:
+        lists = self._lists
+        while left:
+            done, why, who, lists.wall_way = _step.advance(
+                left, self._state, lists.near, lists.surfaces, self._law, lists.edge,
+                lists.wraps, self.gravity, self.time_step, lists.skin - lists.reach,
+                lists.wall_pace, lists.wall_way, self._pending, lists.worst, lists.count,
+            )  # fmt: skip
+            self.steps += done
+            left -= done
+            self._pending = self._pending or done > 0
+            if why == _step.LOST:
+                self._raise_lost(who)
+            if why == _step.RENEW:
+                # In the middle of a step: the way is done, the forces are not.
+                lists.renew()
+                self._state = lists.state
+                self._forces()
+                self.steps += 1
+                left -= 1
+                self._pending = True
+                self._check_overlaps()
+        if self._pending:
+            _step.finish(self._state, lists.near, self.gravity, self.time_step, lists.worst)
+            self._pending = False
+        self._check_overlaps()
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        return self.steps * self.time_step
+
+    # -- state ------------------------------------------------------------------------------
+
+    def _in_order(self, values: NDArray[np.generic]) -> Array:
+        result = np.empty_like(values)
+        result[self._lists.ident] = values
+        return result
+
+    @property
+    def centres(self) -> Array:
+        """Centres, shape (n, 3), in the order of the input [m]."""
+        return self._in_order(self._state.place[:, :3])
+
+    @property
+    def radii(self) -> Array:
+        """Radii, shape (n,) [m]."""
+        return self._in_order(self._state.place[:, 3])
+
+    @property
+    def velocities(self) -> Array:
+        """Velocities, shape (n, 3) [m/s]."""
+        return self._in_order(self._state.motion[:, :3])
+
+    @property
+    def spins(self) -> Array:
+        """Angular velocities, shape (n, 3) [1/s]."""
+        return self._in_order(self._state.motion[:, 3:6])
+
+    @property
+    def masses(self) -> Array:
+        """Masses, shape (n,) [kg]."""
+        return self._in_order(self._state.motion[:, 6])
+
+    @property
+    def forces(self) -> Array:
+        """Contact forces without gravity, shape (n, 3) [N]."""
+        return self._in_order(self._state.load[:, :3])
+
+    @property
+    def torques(self) -> Array:
+        """Contact torques, shape (n, 3) [N m]."""
+        return self._in_order(self._state.load[:, 3:6])
+
+    @property
+    def wall_forces(self) -> Array:
+        """Forces on the walls, shape (walls, 3) [N]."""
+        return self._lists.surfaces.force[:, :, :3].sum(axis=0)
+
+    @property
+    def energies(self) -> Energies:
+        """Energies of motion, spin and height."""
+        m = self._state.motion
+        height = self._state.place[:, :3] @ self.gravity
+        return Energies(
+            float(0.5 * (m[:, 6] * (m[:, :3] ** 2).sum(axis=1)).sum()),
+            float(0.5 * (m[:, 7] * (m[:, 3:6] ** 2).sum(axis=1)).sum()),
+            float(-(m[:, 6] * height).sum()),
+        )
+
+    @property
+    def contacts(self) -> Index:
+        """Pairs in contact, shape (m, 2), numbers of the input."""
+        near = self._lists.near
+        at = np.flatnonzero(near.touch[: near.first[-1]])
+        low = np.searchsorted(near.first, at, side="right") - 1
+        ident = self._lists.ident
+        return np.stack([ident[low], ident[near.partner[at]]], axis=1)
+
+    @property
+    def coordination(self) -> float:
+        """Contacts between particles, per particle [-]."""
+        return 2.0 * len(self.contacts) / len(self._state.place)
+
+    @property
+    def bytes_per_particle(self) -> float:
+        """Memory of state and lists over the number of particles [B]."""
+        return self._lists.bytes / len(self._state.place)
+
+    # -- inside -----------------------------------------------------------------------------
+
+    def _tables(
+        self,
+        contacts: Mapping[tuple[str, str], Contact] | Contact,
+        particles: int,
+        of_walls: list[int],
+    ) -> _step.Law:
+        law = self.law
+        row, table = pair_tables(self.materials, contacts, law, particles, set(of_walls))
+        return _step.Law(
+            NORMAL[law.normal], ROLLING[law.rolling], COHESION[law.cohesion], law.limit_force,
+            row, table,
+        )  # fmt: skip
+
+    def _checked_step(self, time_step: float | None) -> float:
+        if time_step is None:
+            if self.law.normal != "hertz":
+                raise InputError(
+                    f"the {self.law.normal} law needs time_step [s]: a thirtieth of "
+                    "pi sqrt(m / stiffness) of the lightest pair."
+                )
+            return 0.1 * self._rayleigh
+        if not (time_step > 0.0 and math.isfinite(time_step)):
+            raise InputError(f"time_step = {time_step:g} [s] must be finite and above 0.")
+        if self.law.normal == "hertz" and time_step > MOST_OF_RAYLEIGH * self._rayleigh:
+            raise InputError(
+                f"time_step = {time_step:g} [s] exceeds {MOST_OF_RAYLEIGH:g} of Rayleigh's time "
+                f"{self._rayleigh:.3g} [s]; take at most {MOST_OF_RAYLEIGH * self._rayleigh:.3g}, "
+                "or softer particles."
+            )
+        return float(time_step)
+
+    def _forces(self) -> None:
+        lists = self._lists
+        _step.forces(
+            self._state, lists.near, lists.surfaces, self._law, lists.edge, lists.wraps,
+            self.time_step, lists.count,
+        )  # fmt: skip
+
+    def _gather(self) -> None:
+        _step.gather(self._state, self._lists.near)
+
+    def _check_overlaps(self) -> None:
+        count = self._lists.count
+        b = int(count[:, 1].argmax())
+        if count[b, 1] <= self.most_overlap:
+            return
+        near, ident = self._lists.near, self._lists.ident
+        k = int(count[b, 2])
+        low = int(np.searchsorted(near.first, k, side="right")) - 1
+        i, j = int(ident[low]), int(ident[near.partner[k]])
+        place = ", ".join(f"{c:.4g}" for c in self._state.place[low, :3])
+        raise InputError(
+            f"step {self.steps}: particles {i} and {j} at ({place}) [m] overlap by "
+            f"{count[b, 1]:.2g} of a radius, more than {self.most_overlap:g}; part them at the "
+            "start, or take a smaller time step, stiffer particles or a larger most_overlap."
+        )
+
+    def _raise_lost(self, who: int) -> None:
+        place = ", ".join(f"{c:.4g}" for c in self._state.place[who, :3])
+        raise InputError(
+            f"step {self.steps}: particle {int(self._lists.ident[who])} is at ({place}) [m], which "
+            "is no place: a force is infinite or no number; take a smaller time step, and check "
+            "that no two particles start in the same place."
+        )
