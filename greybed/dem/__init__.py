@@ -1,8 +1,19 @@
-"""Particles: contact laws, walls, neighbour search and time steps of spheres."""
+"""Particles that collide: contact laws, walls, time steps, and what is measured of them."""
 
+from greybed.dem.checkpoint import restore, save
 from greybed.dem.laws import ContactLaw
 from greybed.dem.materials import Contact, Material
-from greybed.dem.simulation import Energies, Simulation
+from greybed.dem.particles import Energies
+from greybed.dem.simulation import Simulation
 from greybed.dem.walls import SolidWall
 
-__all__ = ["Contact", "ContactLaw", "Energies", "Material", "Simulation", "SolidWall"]
+__all__ = [
+    "Contact",
+    "ContactLaw",
+    "Energies",
+    "Material",
+    "Simulation",
+    "SolidWall",
+    "restore",
+    "save",
+]

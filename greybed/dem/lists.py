@@ -58,23 +58,62 @@ class Lists:
         self.edge = np.where(self.periodic, self.box[1] - self.box[0], 0.0)
         if not skin > reach:
             raise InputError(f"skin = {skin - reach:g} [m] must be above 0.")
-        blocks = max(1, round(n / BLOCK))
-        block = np.empty(blocks + 1, np.int64)
-        _neighbours.blocks_of(n, BLOCK, block)
+        none = np.zeros(0, np.int64)
         self.near = _step.Near(
             np.zeros(n + 1, np.int64), *_pairs(0, columns), np.zeros((0, 6)),
-            np.zeros(n + 1, np.int64), np.zeros(0, np.int32), block,
+            np.zeros(n + 1, np.int64), np.zeros(0, np.int32), none,
         )  # fmt: skip
         kinds, data, wall, motion = walls
         self.surfaces = _step.Surfaces(
             kinds, data, wall, motion, wall_kind, np.zeros(n + 1, np.int64),
             np.zeros(0, np.int32), np.zeros(0, np.uint8), np.zeros((0, columns)),
-            np.zeros((blocks, len(motion), 6)),
+            np.zeros((0, len(motion), 6)),
         )  # fmt: skip
+        self._lay_blocks(n)
+        self.wall_way = 0.0
+        self.wall_pace = self.pace()
+
+    def _lay_blocks(self, n: int) -> None:
+        """Blocks for so many particles, and what has a row for each of them."""
+        blocks = max(1, round(n / BLOCK))
+        block = np.empty(blocks + 1, np.int64)
+        _neighbours.blocks_of(n, BLOCK, block)
+        self.near = self.near._replace(block=block)
+        self.surfaces = self.surfaces._replace(
+            force=np.zeros((blocks, len(self.surfaces.motion), 6))
+        )
         self.worst = np.zeros((blocks, 2))
         self.count = np.zeros((blocks, 3))
-        self.wall_way = 0.0
-        self.wall_pace = self._pace()
+
+    def extend(self, more: _step.State) -> None:
+        """Take in particles that touch nothing, numbered after those that are there."""
+        m = len(more.place)
+        self.ident = np.concatenate([self.ident, np.arange(m) + len(self.ident)])
+        self.state = _step.State(
+            *(np.concatenate([a, b]) for a, b in zip(self.state, more, strict=True))
+        )
+        near, surfaces = self.near, self.surfaces
+        self.near = near._replace(
+            first=np.concatenate([near.first, np.full(m, near.first[-1])]),
+            into=np.concatenate([near.into, np.full(m, near.into[-1])]),
+        )
+        self.surfaces = surfaces._replace(
+            first=np.concatenate([surfaces.first, np.full(m, surfaces.first[-1])])
+        )
+        self.renew(np.ones(len(self.ident), dtype=bool))
+
+    def drop_wall(self, wall: int) -> None:
+        """Forget the surfaces of a wall; the others keep their numbers."""
+        s = self.surfaces
+        stays = s.wall != wall
+        number = np.cumsum(stays) - 1
+        # Contacts with what is gone: a number that no surface has.
+        surface = np.where(stays[s.surface], number[s.surface], -1).astype(np.int32)
+        self.surfaces = s._replace(
+            kinds=s.kinds[stays], data=s.data[stays], wall=s.wall[stays], surface=surface
+        )
+        self.wall_pace = self.pace()
+        self.renew()
 
     def _checked_box(self, box: ArrayLike | None) -> Array:
         if box is None:
@@ -94,7 +133,7 @@ class Lists:
                 )
         return given
 
-    def _pace(self) -> float:
+    def pace(self) -> float:
         """Highest speed at which a surface may come nearer to a particle [m/s]."""
         s, pace = self.surfaces, 0.0
         for k in range(len(s.kinds)):
@@ -114,10 +153,15 @@ class Lists:
             pace = max(pace, float(np.linalg.norm(m[:3])) + (0.0 if turned else spin * far))
         return pace
 
-    def renew(self) -> None:
-        """Sort the particles by place and list anew who is near whom."""
+    def renew(self, keep: NDArray[np.bool_] | None = None) -> None:
+        """Sort the particles by place and list anew who is near whom.
+
+        ``keep`` says which of them stay, in their present order; all by default. The loads stay,
+        too: what touched a particle that goes gets half a kick from it yet.
+        """
         old, near = self.state, self.near
-        place = old.place
+        chosen = np.arange(len(old.place)) if keep is None else np.flatnonzero(keep)
+        place = old.place[chosen]
         if self.wraps:
             _neighbours.wrap(place, self.box[0], self.edge, self.periodic)
         n = len(place)
@@ -127,8 +171,14 @@ class Lists:
         _neighbours.morton_keys(cell, shape, key)
         # Equal cells keep their order, so that equal states give equal orders.
         order = np.argsort(key, kind="stable")
-        self.ident = self.ident[order]
         place, cell = place[order], cell[order]
+        order = chosen[order]
+        self.ident = self.ident[order]
+        if keep is not None:
+            # Numbers of the input without gaps, in the same order.
+            self.ident = np.argsort(np.argsort(self.ident, kind="stable"), kind="stable")
+            self._lay_blocks(n)
+            near = self.near
         self.state = _step.State(
             place, old.motion[order], old.load[order], old.kind[order], place[:, :3].copy(),
             old.fixed[order],
@@ -182,6 +232,11 @@ class Lists:
     def _renew_surfaces(self, order: Index) -> None:
         s = self.surfaces
         if not len(s.kinds):
+            none = np.zeros(0, np.int32)
+            self.surfaces = s._replace(
+                first=np.zeros(len(order) + 1, np.int64), surface=none,
+                touch=np.zeros(0, np.uint8), history=np.zeros((0, self.columns)),
+            )  # fmt: skip
             return
         place = self.state.place
         first = np.empty(len(place) + 1, np.int64)
@@ -198,6 +253,22 @@ class Lists:
             order, first, surface, s.first, s.surface, s.touch, s.history, touch, history
         )
         self.surfaces = s._replace(first=first, surface=surface, touch=touch, history=history)
+
+    def pairs(self, chosen: NDArray[np.bool_]) -> Index:
+        """Listed pairs that are chosen, (m, 2), in numbers of the input."""
+        at = np.flatnonzero(chosen)
+        low = np.searchsorted(self.near.first, at, side="right") - 1
+        return np.stack([self.ident[low], self.ident[self.near.partner[at]]], axis=1)
+
+    def touching(self) -> Index:
+        """Pairs whose surfaces overlap now, (m, 2), whether or not their forces are known."""
+        near, place = self.near, self.state.place
+        low = np.repeat(np.arange(len(place)), np.diff(near.first))
+        shift = near.shift.astype(np.int64)
+        images = np.stack([shift // 9, shift // 3 % 3, shift % 3], axis=1) - 1
+        away = place[near.partner, :3] + images * self.edge - place[low, :3]
+        both = place[low, 3] + place[near.partner, 3]
+        return self.pairs((away**2).sum(axis=1) < both**2)
 
     @property
     def bytes(self) -> int:

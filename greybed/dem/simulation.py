@@ -15,18 +15,17 @@ from greybed.dem import _columns, _step
 from greybed.dem.laws import COHESION, NORMAL, ROLLING, ContactLaw
 from greybed.dem.lists import Lists
 from greybed.dem.materials import Contact, Material, pair_tables
-from greybed.dem.particles import Energies, particle_arrays, rayleigh_time
+from greybed.dem.particles import particle_arrays, rayleigh_time
+from greybed.dem.population import MOST_OF_RAYLEIGH, Population
 from greybed.dem.walls import SolidWall, surfaces_of
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-# Share of Rayleigh's time above which contacts are no longer followed [-].
-MOST_OF_RAYLEIGH = 0.4
 GRAVITY = (0.0, 0.0, -9.81)
 
 
-class Simulation:
+class Simulation(Population):
     """Spheres that collide, roll and stick, between walls, under gravity.
 
     Parameters
@@ -41,6 +40,8 @@ class Simulation:
         By pairs of names, ``{("glass", "steel"): Contact(0.9, 0.3)}``; one for all.
     kinds : array_like of int, shape (n,), optional
         Number of each particle's material; the first by default.
+    kinds_to_come : int
+        Materials up to this number may be those of particles inserted later.
     law : ContactLaw
         Contact laws.
     walls : sequence of SolidWall
@@ -82,6 +83,7 @@ class Simulation:
         contacts: Mapping[tuple[str, str], Contact] | Contact,
         *,
         kinds: ArrayLike | None = None,
+        kinds_to_come: int = 1,
         law: ContactLaw | None = None,
         walls: Sequence[SolidWall] = (),
         box: ArrayLike | None = None,
@@ -112,7 +114,8 @@ class Simulation:
                     f"{', '.join(names)}."
                 )
             of_walls.append(names.index(name))
-        self._law = self._tables(contacts, int(kind.max()) + 1, of_walls)
+        self._kinds = max(int(kind.max()) + 1, int(kinds_to_come))
+        self._law = self._tables(contacts, self._kinds, of_walls)
         self._rayleigh = rayleigh_time(place, kind, known)
         self.time_step = self._checked_step(time_step)
         self.gravity = np.array(gravity, dtype=np.float64)
@@ -142,6 +145,8 @@ class Simulation:
                 f"threads = {self.threads} must lie in 1 ... {numba.config.NUMBA_NUM_THREADS}."
             )
         self.steps = 0
+        self.labels = np.arange(n)
+        self._next = n
         self._pending = False
         self._lists.renew()
         self._state = self._lists.state
@@ -197,88 +202,6 @@ class Simulation:
             _step.finish(self._state, lists.near, self.gravity, self.time_step, lists.worst)
             self._pending = False
         self._check_overlaps()
-
-    @property
-    def time(self) -> float:
-        """Time since the start [s]."""
-        return self.steps * self.time_step
-
-    # -- state ------------------------------------------------------------------------------
-
-    def _in_order(self, values: NDArray[np.generic]) -> Array:
-        result = np.empty_like(values)
-        result[self._lists.ident] = values
-        return result
-
-    @property
-    def centres(self) -> Array:
-        """Centres, shape (n, 3), in the order of the input [m]."""
-        return self._in_order(self._state.place[:, :3])
-
-    @property
-    def radii(self) -> Array:
-        """Radii, shape (n,) [m]."""
-        return self._in_order(self._state.place[:, 3])
-
-    @property
-    def velocities(self) -> Array:
-        """Velocities, shape (n, 3) [m/s]."""
-        return self._in_order(self._state.motion[:, :3])
-
-    @property
-    def spins(self) -> Array:
-        """Angular velocities, shape (n, 3) [1/s]."""
-        return self._in_order(self._state.motion[:, 3:6])
-
-    @property
-    def masses(self) -> Array:
-        """Masses, shape (n,) [kg]."""
-        return self._in_order(self._state.motion[:, 6])
-
-    @property
-    def forces(self) -> Array:
-        """Contact forces without gravity, shape (n, 3) [N]."""
-        return self._in_order(self._state.load[:, :3])
-
-    @property
-    def torques(self) -> Array:
-        """Contact torques, shape (n, 3) [N m]."""
-        return self._in_order(self._state.load[:, 3:6])
-
-    @property
-    def wall_forces(self) -> Array:
-        """Forces on the walls, shape (walls, 3) [N]."""
-        return self._lists.surfaces.force[:, :, :3].sum(axis=0)
-
-    @property
-    def energies(self) -> Energies:
-        """Energies of motion, spin and height."""
-        m = self._state.motion
-        height = self._state.place[:, :3] @ self.gravity
-        return Energies(
-            float(0.5 * (m[:, 6] * (m[:, :3] ** 2).sum(axis=1)).sum()),
-            float(0.5 * (m[:, 7] * (m[:, 3:6] ** 2).sum(axis=1)).sum()),
-            float(-(m[:, 6] * height).sum()),
-        )
-
-    @property
-    def contacts(self) -> Index:
-        """Pairs in contact, shape (m, 2), numbers of the input."""
-        near = self._lists.near
-        at = np.flatnonzero(near.touch[: near.first[-1]])
-        low = np.searchsorted(near.first, at, side="right") - 1
-        ident = self._lists.ident
-        return np.stack([ident[low], ident[near.partner[at]]], axis=1)
-
-    @property
-    def coordination(self) -> float:
-        """Contacts between particles, per particle [-]."""
-        return 2.0 * len(self.contacts) / len(self._state.place)
-
-    @property
-    def bytes_per_particle(self) -> float:
-        """Memory of state and lists over the number of particles [B]."""
-        return self._lists.bytes / len(self._state.place)
 
     # -- inside -----------------------------------------------------------------------------
 

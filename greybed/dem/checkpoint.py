@@ -1,0 +1,132 @@
+"""Checkpoints: the whole state of a simulation in a file, from which it goes on bit by bit."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from greybed.core.errors import InputError
+from greybed.core.files import atomic_path
+from greybed.dem import _step
+from greybed.dem.lists import Lists
+from greybed.dem.simulation import Simulation
+
+FORMAT = "greybed-particles-1"
+
+
+def save(simulation: Simulation, path: str | os.PathLike[str], **extra: Any) -> Path:
+    """Write a checkpoint, whole or not at all.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Between two runs.
+    path : path
+        ``.npz`` file to write.
+    extra : JSON values
+        Kept beside the state and given back by :func:`restore`.
+
+    Raises
+    ------
+    OutputError
+        If the file cannot be written.
+    """
+    lists = simulation._lists
+    arrays: dict[str, Any] = {
+        f"{part}_{name}": value
+        for part, group in (
+            ("state", lists.state), ("near", lists.near), ("surfaces", lists.surfaces)
+        )
+        for name, value in group._asdict().items()
+    }  # fmt: skip
+    numbers = {
+        "format": FORMAT,
+        "digest": _digest(simulation),
+        "steps": simulation.steps,
+        "next": simulation._next,
+        "wall_way": lists.wall_way,
+        "skin": lists.skin,
+        "extra": extra,
+    }
+    with atomic_path(path) as part, open(part, "wb") as stream:
+        np.savez(
+            stream, allow_pickle=False, ident=lists.ident, labels=simulation.labels,
+            worst=lists.worst, count=lists.count, numbers=np.array(json.dumps(numbers)), **arrays,
+        )  # fmt: skip
+    return Path(path)
+
+
+def restore(simulation: Simulation, path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Put a simulation into the state of a checkpoint.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Made with the same materials, laws, walls, box, gravity and time step; its particles do
+        not matter.
+    path : path
+        File of :func:`save`.
+
+    Returns
+    -------
+    dict
+        What was kept beside the state.
+
+    Raises
+    ------
+    InputError
+        If the file is absent, damaged, or of a simulation that was made otherwise.
+    """
+    try:
+        with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
+        numbers = json.loads(str(arrays.pop("numbers")))
+        groups: dict[str, Any] = {
+            part: kind(**{name: arrays[f"{part}_{name}"] for name in kind._fields})
+            for part, kind in (
+                ("state", _step.State), ("near", _step.Near), ("surfaces", _step.Surfaces)
+            )
+        }  # fmt: skip
+    except OSError as error:
+        raise InputError(f"{path}: cannot read this checkpoint ({error.strerror}).") from None
+    except Exception as error:  # what numpy and zipfile raise for a cut file is not documented
+        raise InputError(
+            f"{path}: this checkpoint is cut or damaged ({type(error).__name__}); take an older "
+            "one, or start anew."
+        ) from None
+    if numbers.get("format") != FORMAT or numbers.get("digest") != _digest(simulation):
+        raise InputError(
+            f"{path}: this checkpoint is of a simulation with other materials, laws, walls, box, "
+            "gravity or time step; give the case that wrote it, or start anew."
+        )
+    lists: Lists = simulation._lists
+    lists.state, lists.near, lists.surfaces = groups["state"], groups["near"], groups["surfaces"]
+    lists.ident, lists.worst, lists.count = arrays["ident"], arrays["worst"], arrays["count"]
+    lists.wall_way, lists.skin = float(numbers["wall_way"]), float(numbers["skin"])
+    lists.wall_pace = lists.pace()
+    simulation._state = lists.state
+    simulation.labels = arrays["labels"]
+    simulation.steps, simulation._next = int(numbers["steps"]), int(numbers["next"])
+    simulation._pending = False
+    return dict(numbers["extra"])
+
+
+def _digest(simulation: Simulation) -> str:
+    """SHA-256 of what decides how a state goes on, besides the state itself."""
+    law, lists = simulation._law, simulation._lists
+    text = [
+        [int(law.normal), int(law.rolling), int(law.cohesion), bool(law.limit)],
+        [wall.shape.name for wall in simulation.walls],
+        [material.name for material in simulation.materials],
+        lists.periodic.tolist(), lists.box.tolist(), simulation.gravity.tolist(),
+        simulation.time_step, lists.reach, simulation._kinds,
+    ]  # fmt: skip
+    digest = hashlib.sha256(json.dumps(text).encode())
+    for array in (law.row, law.table):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
