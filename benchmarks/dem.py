@@ -41,7 +41,7 @@ TILES = (5, 2)  # beds beside each other: 200,000 spheres
 GLASS = Material(2500.0, 5e6, 0.45, "glass")
 SKINS = (0.05, 0.1, 0.25, 0.5)  # of LIGGGHTS, in radii
 PLAIN = "hertz tangential history"
-RICH = f"{PLAIN} rolling_friction epsd cohesion sjkr tangential_reduce on"
+RICH = f"{PLAIN} rolling_friction epsd cohesion sjkr"
 SAME_ENERGY, SAME_CONTACTS = 0.02, 0.01
 
 
@@ -147,8 +147,11 @@ def write_data(state: State, path: Path) -> None:
 def deck(state: State, options: argparse.Namespace, skin: float, steps: int) -> str:
     """LIGGGHTS' input."""
     model = RICH if options.epsd else PLAIN
+    # Cohesion acts on friction here always, there only if told.
+    settings = "tangential_reduce on" if options.epsd else ""
     walls = "\n".join(
-        f"fix w{axis}{side} all wall/gran model {model} primitive type 1 {axis}plane {side * e:g}"
+        f"fix w{axis}{side} all wall/gran model {model} primitive type 1 {axis}plane {side * e:g} "
+        f"{settings}"
         for axis, e in zip("xyz", state.edges, strict=True)
         for side in (0, 1)
     )
@@ -170,7 +173,7 @@ fix m4 all property/global coefficientFriction peratomtypepair 1 0.5
 fix m5 all property/global coefficientRollingFriction peratomtypepair 1 0.1
 fix m6 all property/global coefficientRollingViscousDamping peratomtypepair 1 0.3
 fix m7 all property/global cohesionEnergyDensity peratomtypepair 1 1000
-pair_style gran model {model}
+pair_style gran model {model} {settings}
 pair_coeff * *
 timestep {STEP:g}
 fix gravi all gravity 9.81 vector 0.0 0.0 -1.0

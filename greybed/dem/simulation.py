@@ -150,7 +150,8 @@ class Simulation(Population):
         self._pending = False
         self._lists.renew()
         self._state = self._lists.state
-        self._forces()
+        # No time has passed yet: a spring stretched now would count its first step twice.
+        self._forces(0.0)
         self._check_overlaps()
         # Loads with what came across blocks, so that the first kick of a run finds them whole.
         self._gather()
@@ -193,7 +194,7 @@ class Simulation(Population):
                 # In the middle of a step: the way is done, the forces are not.
                 lists.renew()
                 self._state = lists.state
-                self._forces()
+                self._forces(self.time_step)
                 self.steps += 1
                 left -= 1
                 self._pending = True
@@ -236,11 +237,12 @@ class Simulation(Population):
             )
         return float(time_step)
 
-    def _forces(self) -> None:
+    def _forces(self, passed: float) -> None:
+        """Forces; springs stretch by what has moved in the time that has passed [s]."""
         lists = self._lists
         _step.forces(
             self._state, lists.near, lists.surfaces, self._law, lists.edge, lists.wraps,
-            self.time_step, lists.count,
+            passed, lists.count,
         )  # fmt: skip
 
     def _gather(self) -> None:
