@@ -109,6 +109,17 @@ def test_lists_find_every_contact_and_keep_springs():
     assert len(near.contacts) > 10
 
 
+def test_springs_at_the_start_are_not_stretched_yet():
+    sim = pair(
+        ContactLaw(tangential_damping=False), gap=-1e-6, speed=0.0,
+        velocities=[[0, 0.2, 0], [0, -0.2, 0]],
+    )  # fmt: skip
+    assert sim.forces[0, 0] < 0.0
+    assert sim.forces[0, 1] == 0.0
+    sim.run(1)
+    assert sim.forces[0, 1] < 0.0
+
+
 def test_images_across_the_box_are_met():
     edge = 10 * R
     sim = Simulation(
