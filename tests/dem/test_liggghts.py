@@ -6,8 +6,8 @@ default, as its headers say (Debian: libliggghts-dev) and as these runs show:
 - the spring of a contact that has parted stays, and pulls when the two touch again within one list,
   unless ``contact_distance_factor`` is above 1;
 - ``sjkr`` acts on friction only with ``tangential_reduce on``;
-- ``epsd`` multiplies the spin on a wall by (r - d / 2) / (r - d), where d is the overlap. Here it is
-  the spin itself, so that ``epsd`` is compared away from walls.
+- ``epsd`` multiplies the spin on a wall by (r - d / 2) / (r - d), where d is the overlap. Here it
+  is the spin itself, so that ``epsd`` is compared away from walls.
 """
 
 from __future__ import annotations
