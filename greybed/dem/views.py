@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,7 +29,7 @@ class Views:
         """Time since the start [s]."""
         return self.steps * self.time_step
 
-    def _in_order(self, values: NDArray[np.generic]) -> Array:
+    def _in_order(self, values: NDArray[Any]) -> NDArray[Any]:
         result = np.empty_like(values)
         result[self._lists.ident] = values
         return result
@@ -41,6 +43,11 @@ class Views:
     def radii(self) -> Array:
         """Radii, shape (n,) [m]."""
         return self._in_order(self._state.place[:, 3])
+
+    @property
+    def kinds(self) -> Index:
+        """Numbers of the materials, shape (n,)."""
+        return self._in_order(self._state.kind)
 
     @property
     def velocities(self) -> Array:
