@@ -55,10 +55,12 @@ class ContactTable:
     sliding_friction: float | None = quantity("dimensionless", None, at_least=0.0)  # [-]
     rolling_friction: float = quantity("dimensionless", 0.0, at_least=0.0)  # [-]
     rolling_damping: float = quantity("dimensionless", 0.0, at_least=0.0, at_most=1.0)  # [-]
-    # In the SI unit of the law: J/m3 (sjkr), J/m2 (dmt), J (van-der-waals).
+    # In the SI unit of the law: J/m3 (sjkr), J/m2 (dmt, jkr), J (van-der-waals), N/m (bridges).
     cohesion: float = quantity("dimensionless", 0.0, at_least=0.0)
     nearest: float = quantity("length", 0.0, at_least=0.0)  # [m]
     reach: float = quantity("length", 0.0, at_least=0.0)  # [m]
+    bridge_volume: float = quantity("volume", 0.0, at_least=0.0)  # [m3]
+    contact_angle: float = quantity("angle", 0.0, at_least=0.0)  # [rad]
     stiffness: float | None = quantity("stiffness", None, above=0.0)  # [N/m]
     tangential_ratio: float = quantity("dimensionless", 2.0 / 7.0, above=0.0)  # [-]
 

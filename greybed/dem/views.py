@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from greybed.dem import _step
+from greybed.dem import _columns, _step
 from greybed.dem.lists import Lists
 from greybed.dem.particles import Energies
 
@@ -94,7 +94,13 @@ class Views:
     def contacts(self) -> Index:
         """Pairs in contact, shape (m, 2), numbers of the input."""
         near = self._lists.near
-        return self._lists.pairs(near.touch[: near.first[-1]].astype(bool))
+        return self._lists.pairs(near.touch[: near.first[-1]] == _columns.TOUCH)
+
+    @property
+    def bridges(self) -> Index:
+        """Pairs that a liquid bridge joins across a gap, shape (m, 2), numbers of the input."""
+        near = self._lists.near
+        return self._lists.pairs(near.touch[: near.first[-1]] == _columns.BRIDGE)
 
     @property
     def coordination(self) -> float:
