@@ -50,6 +50,7 @@ class ContactTable:
     """``[[contact]]`` of two materials; see :class:`greybed.dem.Contact`."""
 
     between: tuple[str, ...] = words()
+    name: str | None = None  # for the studies that vary it
     restitution: float = quantity("dimensionless", above=0.0, at_most=1.0)  # [-]
     friction: float = quantity("dimensionless", at_least=0.0)  # [-]
     sliding_friction: float | None = quantity("dimensionless", None, at_least=0.0)  # [-]
