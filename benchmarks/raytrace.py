@@ -31,10 +31,10 @@ from pathlib import Path
 import numpy as np
 
 from greybed.core import Packing
+from greybed.core.sizes import Mono, Uniform
 from greybed.datasets.containers import Box
 from greybed.datasets.generate import random_packing
 from greybed.datasets.lattices import lattice
-from greybed.datasets.sizes import Mono, Uniform
 from greybed.raytrace import first_hits, pair_factors, standard_error, tally, view_factors
 
 SOURCE = Path(__file__).parent / "peers" / "embree_rate.cpp"

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from greybed.core import Packing, box_walls
+from greybed.core.sizes import Mono
 from greybed.coupling import pairwise_network, radiative_network
 from greybed.datasets.containers import Box
 from greybed.datasets.generate import random_packing
-from greybed.datasets.sizes import Mono
 from greybed.raytrace import exchange_factors, radiative_exchange_factor
 
 SIGMA = 5.670374419e-8  # [W/m2/K4]

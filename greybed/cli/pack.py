@@ -100,10 +100,10 @@ def run(options: argparse.Namespace) -> int:
 
     from greybed.cli.info import describe
     from greybed.core.files import output_folder, write_summary
+    from greybed.core.sizes import parse_sizes
     from greybed.core.writers import keeps_surroundings, write_packing
     from greybed.datasets.containers import solid_fraction_between_walls, wall_overlap
     from greybed.datasets.generate import random_packing
-    from greybed.datasets.sizes import parse_sizes
 
     sizes = parse_sizes(options.sizes)
     container = _container(options.container, options.container_radius)

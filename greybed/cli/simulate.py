@@ -1,8 +1,13 @@
-"""Run a coupled case from a TOML file: temperatures of a bed of spheres between hot and cold walls.
+"""Run a case from a TOML file: temperatures of a bed between walls, or particles that move.
 
-Writes temperatures.csv, bed.vtu (for ParaView) and summary.json; a transient case also history.csv.
+kind = "thermal-bed" writes temperatures.csv, bed.vtu (for ParaView) and summary.json; a transient
+case also history.csv. kind = "particles" writes history.csv, final.h5, final.vtu, final.png,
+frames.pvd with its frames, and summary.json; stopped by Ctrl-C or a kill, it goes on from its
+checkpoint when the same command is given again, and ends with the same bits.
 
-example: greybed simulate examples/heated_bed/case.toml --out runs/heated_bed
+examples:
+  greybed simulate examples/heated_bed/case.toml --out runs/heated_bed
+  greybed simulate examples/hopper/case.toml --out runs/hopper --movie
 """
 
 from __future__ import annotations
@@ -12,6 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
+from greybed.cli.simulate_particles import run_particles
+from greybed.core.config import read_toml
 from greybed.core.errors import InputError
 from greybed.core.files import atomic_path, output_folder, write_summary
 from greybed.core.packing import Packing
@@ -22,9 +29,10 @@ TICKS = 1000  # of a progress bar that counts a fraction
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the options of ``greybed simulate``."""
-    parser.add_argument("case", type=Path, help='case file (TOML, kind = "thermal-bed")')
+    parser.add_argument("case", type=Path, help="case file (TOML)")
     parser.add_argument("--out", type=Path, required=True, help="folder for the results")
-    parser.add_argument("--threads", type=int, help="threads for the ray tracer (default: all)")
+    parser.add_argument("--threads", type=int, help="threads (default: all); changes no bit")
+    parser.add_argument("--movie", action="store_true", help="particles: movie.gif of the frames")
     parser.add_argument("--quiet", action="store_true", help="no progress bars")
 
 
@@ -40,6 +48,10 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(
             f"--threads = {options.threads} [-] must be at least 1; leave it out for all."
         )
+    if read_toml(options.case).get("kind") == "particles":
+        return run_particles(options)
+    if options.movie:
+        raise InputError("--movie is for particles only; leave it out.")
     case = load_case(options.case)
     folder = output_folder(options.out)
     packing = read_packing(case.packing.file, walls=case.walls)

@@ -61,6 +61,16 @@ def tables(key: str, variants: Mapping[str, type], default: Any = MISSING) -> An
     return dataclasses.field(default=default, metadata={"key": key, "variants": dict(variants)})
 
 
+def rows(kind: type, default: Any = MISSING) -> Any:
+    """Field of a case: a list of tables of one dataclass."""
+    return dataclasses.field(default=default, metadata={"rows": kind})
+
+
+def words(default: Any = MISSING) -> Any:
+    """Field of a case: a list of strings."""
+    return dataclasses.field(default=default, metadata={"words": True})
+
+
 @dataclasses.dataclass(frozen=True)
 class _Place:
     """Where a value stands: file and dotted key."""
@@ -112,8 +122,8 @@ def read_case(path: str | os.PathLike[str], kind: type[T]) -> T:
         The file.
     kind : dataclass
         Fields made by :func:`quantity`, :func:`vector`, :func:`whole`, :func:`choice`,
-        :func:`tables`, or plain ones of type str, bool, int, Path (relative to the file), or
-        a dataclass.
+        :func:`tables`, :func:`rows`, :func:`words`, or plain ones of type str, bool, int, Path
+        (relative to the file), or a dataclass.
 
     Returns
     -------
@@ -169,6 +179,10 @@ def _wanted(hint: Any, field: dataclasses.Field[Any]) -> str:
         dimension = field.metadata["dimension"]
         what = "three numbers" if "size" in field.metadata else f"a {dimension}"
         return f"{what}{_unit(dimension)}"
+    if "rows" in field.metadata:
+        return "a list of tables"
+    if "words" in field.metadata:
+        return "a list of strings"
     if "variants" in field.metadata:
         return f"[[{field.name}]] tables"
     if dataclasses.is_dataclass(hint):
@@ -182,6 +196,13 @@ def _value(value: Any, hint: Any, rules: Mapping[str, Any], place: _Place) -> An
         hint = next(h for h in get_args(hint) if h is not types.NoneType)
     if "variants" in rules:
         return _variants(value, rules["key"], rules["variants"], place)
+    if "rows" in rules:
+        return _rows(value, rules["rows"], place)
+    if "words" in rules:
+        items = _typed(value, list, 'a list of strings, like ["a", "b"]', place)
+        return tuple(
+            _typed(v, str, "a string in quotes", place.at(str(i))) for i, v in enumerate(items)
+        )
     if "options" in rules:
         return _choice(value, rules["options"], place)
     if "size" in rules:
@@ -256,6 +277,14 @@ def _vector(value: Any, dimension: str, place: _Place) -> tuple[float, float, fl
         raise InputError(f"{place} = {value!r} must be three numbers, like [0.0, 0.0, 1.0].")
     x, y, z = (_number(v, dimension, place) for v in value)
     return x, y, z
+
+
+def _rows(value: Any, kind: type[T], place: _Place) -> tuple[T, ...]:
+    if not isinstance(value, list):
+        raise InputError(f"{place} must be a list of tables; write each one as [[{place.key}]].")
+    return tuple(
+        _table(kind, item, _Place(place.file, f"{place.key}[{i}]")) for i, item in enumerate(value)
+    )
 
 
 def _variants(value: Any, key: str, variants: Mapping[str, type], place: _Place) -> tuple[Any, ...]:

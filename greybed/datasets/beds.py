@@ -11,11 +11,11 @@ import numpy as np
 
 from greybed.core import InputError, Packing
 from greybed.core.config import choice, quantity, whole
+from greybed.core.sizes import parse_sizes
 from greybed.datasets.containers import Box, CylinderContainer, PeriodicBox
 from greybed.datasets.generate import MOST_SPHERES, random_packing
 from greybed.datasets.lattices import lattice
 from greybed.datasets.sheared import sheared_packing
-from greybed.datasets.sizes import parse_sizes
 
 SPLITS = ("train", "calibrate", "test")
 # Spheres of a lattice without jitter all stand alike: few of them tell everything.

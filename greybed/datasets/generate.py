@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from greybed.core.errors import InputError, VerificationError
 from greybed.core.packing import Packing
 from greybed.core.progress import progress
+from greybed.core.sizes import Discrete, LogNormal, Mono, Sizes, Uniform, parse_sizes
 from greybed.datasets import _kernels
 from greybed.datasets.containers import (
     Box,
@@ -22,7 +23,6 @@ from greybed.datasets.containers import (
     solid_fraction_between_walls,
     wall_overlap,
 )
-from greybed.datasets.sizes import Discrete, LogNormal, Mono, Sizes, Uniform, parse_sizes
 
 __all__ = [
     "Box",

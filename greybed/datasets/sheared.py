@@ -8,9 +8,9 @@ import numpy as np
 
 from greybed.core.errors import InputError
 from greybed.core.packing import Packing
+from greybed.core.sizes import Sizes
 from greybed.datasets.containers import PeriodicBox
 from greybed.datasets.generate import STEPS, _relax, _Setup, _verified, random_packing
-from greybed.datasets.sizes import Sizes
 
 SHEAR_STEP = 0.02  # strain between two relaxations [-]
 

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from greybed.dem import _columns as col
-from greybed.dem._cohesion import energy_density, pull_off, van_der_waals
+from greybed.dem._cohesion import bridges, energy_density, jkr, pull_off, van_der_waals
 from greybed.dem._rolling import constant_torque, rolling_spring
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
@@ -26,13 +26,15 @@ def room(table):
 def solve(work, n, dt, normal, rolling, cohesion, limit):
     """Forces F on the first body, n x tangential force B, rolling torque R on the second."""
     surface_velocity(work, n)
-    if normal == col.HERTZ:
+    if cohesion == col.JKR:
+        jkr(work, n, limit)
+    elif normal == col.HERTZ:
         hertz(work, n)
     elif normal == col.LINEAR:
         linear(work, n)
     else:
         hysteresis(work, n)
-    if limit:
+    if limit and cohesion != col.JKR:
         cut_attraction(work, n)
     if cohesion == col.SJKR:
         energy_density(work, n)
@@ -40,6 +42,8 @@ def solve(work, n, dt, normal, rolling, cohesion, limit):
         pull_off(work, n)
     elif cohesion == col.VAN_DER_WAALS:
         van_der_waals(work, n)
+    elif cohesion == col.LIQUID:
+        bridges(work, n)
     stretch(work, n, dt)
     friction(work, n)
     lever(work, n)
@@ -269,10 +273,10 @@ def friction(work, n):
         work[col.FY],
         work[col.VY],
     )
-    fz, vz = work[col.FZ], work[col.VZ]
+    fz, vz, extra = work[col.FZ], work[col.VZ], work[col.HELD]
     for c in range(n):
         held = k_t[c] * math.sqrt(sx[c] * sx[c] + sy[c] * sy[c] + sz[c] * sz[c])
-        pressed = abs(force[c])
+        pressed = abs(force[c] + extra[c])
         slides = held > static[c] * pressed
         share = sliding[c] * pressed / held if slides else 1.0
         dashpot = 0.0 if slides else viscous[c]

@@ -3,7 +3,7 @@
 # Normal laws, rolling resistance and cohesion; 0 is none where there may be none.
 LINEAR, HERTZ, HYSTERESIS = 0, 1, 2
 NO_ROLLING, CONSTANT_TORQUE, EPSD, EPSD_MODIFIED = 0, 1, 2, 3
-NO_COHESION, SJKR, DMT, VAN_DER_WAALS = 0, 1, 2, 3
+NO_COHESION, SJKR, DMT, VAN_DER_WAALS, JKR, LIQUID = 0, 1, 2, 3, 4, 5
 
 # Columns of the table of material pairs.
 MODULUS = 0  # E* [Pa]; stiffness [N/m] for linear laws
@@ -14,14 +14,17 @@ FRICTION = 4  # static friction [-]
 SLIDING = 5  # dynamic friction [-]
 ROLLING = 6  # rolling friction [-]
 ROLLING_DAMPING = 7  # share of critical rolling damping [-]
-COHESION = 8  # energy density [J/m3], surface energy [J/m2] or Hamaker constant [J]
+COHESION = 8  # energy density [J/m3], surface energy [J/m2], Hamaker constant [J] or tension [N/m]
 UNLOADING = 9  # unloading over loading stiffness of the hysteretic law [-]
 COLUMNS = 12
-NEAREST = 10  # gap below which van der Waals forces no longer grow [m]
+NEAREST = 10  # gap below which van der Waals forces no longer grow [m]; volume of a bridge [m3]
 REACH = 11  # gap beyond which cohesion ends [m]
 
 # Columns of the history of a contact.
 SPRING, TWIST, PLASTIC = 0, 3, 6
+
+# What a contact is: none, surfaces that touch, or a bridge of liquid across a gap.
+APART, TOUCH, BRIDGE = 0, 1, 2
 
 # Contacts of a batch: its rows stay in the nearest cache.
 SIZE = 96
@@ -36,4 +39,5 @@ UN, VX, VY, VZ, FORCE, K_N, K_T, DRAG = range(31, 39)
 SX, SY, SZ, TX, TY, TZ, DEEP = range(39, 46)
 FX, FY, FZ, BX, BY, BZ, RX, RY, RZ = range(46, 55)
 RI, RJ, MI, MJ = range(55, 59)
-ROWS = 59
+HELD = 59  # what presses the surfaces together besides the normal force [N]; 0 but for JKR
+ROWS = 60

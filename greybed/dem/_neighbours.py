@@ -137,7 +137,7 @@ def carry_over(
             sign = 1.0 if low == a else -1.0
             for m in range(old_first[low], old_first[low + 1]):
                 if old_partner[m] == high and old_touch[m]:
-                    touch[k] = 1
+                    touch[k] = old_touch[m]
                     for column in range(history.shape[1]):
                         turned = sign if column < 6 else 1.0
                         history[k, column] = turned * old_history[m, column]

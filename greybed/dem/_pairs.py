@@ -7,7 +7,7 @@ from numba import njit
 
 from greybed.dem import _columns as col
 from greybed.dem._batch import pair_extras, pair_geometry, room, solve
-from greybed.dem._cohesion import attraction
+from greybed.dem._cohesion import attraction, bridge, neck
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
@@ -46,6 +46,13 @@ def block_forces(
             both = r + at[np.uint64(4 * j + 3)]
             square = dx * dx + dy * dy + dz * dz
             hit = square < both * both
+            gap = 0.0
+            if cohesion >= col.JKR and not hit and touch[k] != col.APART:
+                # A neck, of solid or liquid, holds on where the surfaces no longer touch.
+                gap = math.sqrt(square) - both
+                if cohesion == col.JKR:
+                    r_eff = r * at[4 * j + 3] / both
+                    hit = gap < neck(r_eff, table, row[kind[i], kind[j]])
             # Written whether they touch or not: whether they do is a guess that costs more.
             c = np.uint64(filled)
             who[c], who[c + np.uint64(col.SIZE)], who[c + np.uint64(2 * col.SIZE)] = i, j, k
@@ -53,17 +60,21 @@ def block_forces(
             flat[np.uint64(col.NY * col.SIZE) + c] = dy
             flat[np.uint64(col.NZ * col.SIZE) + c] = dz
             filled += hit
-            if touch[np.uint64(k)] != hit:
-                touch[k] = hit
+            now = np.uint8(hit)
+            if gap > 0.0 and cohesion == col.LIQUID:
+                within = gap < table[row[kind[i], kind[j]], col.REACH]
+                now = np.uint8(col.BRIDGE if within else col.APART)
+            if touch[np.uint64(k)] != now:
+                touch[k] = now
                 if not hit:
                     for m in range(columns):
                         history[k, m] = 0.0
                     if slot[k] >= 0:
                         for m in range(6):
                             crossing[slot[k], m] = 0.0
-            if cohesion == col.VAN_DER_WAALS and not hit:
+            if (cohesion == col.VAN_DER_WAALS and not hit) or now == col.BRIDGE:
                 _attract(i, j, k, dx, dy, dz, square, r, at[4 * j + 3], table,
-                         row[kind[i], kind[j]], load, slot, crossing)  # fmt: skip
+                         row[kind[i], kind[j]], load, slot, crossing, cohesion)  # fmt: skip
             if filled == col.SIZE:
                 _settle(work, who, filled, place, motion, load, kind, history, slot, crossing, row,
                         table, dt, normal, rolling, cohesion, limit, count)  # fmt: skip
@@ -74,10 +85,14 @@ def block_forces(
 
 
 @njit(**_OPTIONS)
-def _attract(i, j, k, dx, dy, dz, square, ri, rj, table, p, load, slot, crossing):
+def _attract(i, j, k, dx, dy, dz, square, ri, rj, table, p, load, slot, crossing, cohesion):
     """Attraction across a gap."""
     distance = math.sqrt(square)
-    pull = attraction(distance - ri - rj, ri * rj / (ri + rj), table, p) / distance
+    gap, r_eff = distance - ri - rj, ri * rj / (ri + rj)
+    if cohesion == col.LIQUID:
+        pull = bridge(gap, r_eff, table, p) / distance
+    else:
+        pull = attraction(gap, r_eff, table, p) / distance
     fx, fy, fz = pull * dx, pull * dy, pull * dz
     load[i, 0] -= fx
     load[i, 1] -= fy

@@ -7,7 +7,7 @@ from numba import njit
 
 from greybed.dem import _columns as col
 from greybed.dem._batch import room, solve
-from greybed.dem._cohesion import attraction
+from greybed.dem._cohesion import attraction, bridge, neck
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
@@ -201,7 +201,7 @@ def carry_over_walls(
                 history[k, column] = 0.0
             for m in range(old_first[a], old_first[a + 1]):
                 if old_surface[m] == surface[k] and old_touch[m]:
-                    touch[k] = 1
+                    touch[k] = old_touch[m]
                     for column in range(history.shape[1]):
                         history[k, column] = old_history[m, column]
 
@@ -239,15 +239,26 @@ def wall_forces(
                 w = wall[s]
                 p = row[kind[i], wall_kind[w]]
                 overlap = r - distance
-                if overlap <= 0.0:
-                    if touch[k]:
-                        touch[k] = 0
+                least, now = 0.0, col.APART
+                if cohesion == col.JKR and touch[k] == col.TOUCH:
+                    least = -neck(r, table, p)
+                if overlap <= least:
+                    if cohesion == col.LIQUID and touch[k] and -overlap < table[p, col.REACH]:
+                        now = col.BRIDGE
+                    if touch[k] != now:
+                        touch[k] = now
                         forget(history, k)
-                    if cohesion == col.VAN_DER_WAALS:
-                        pull = attraction(-overlap, r, table, p)
+                    if cohesion == col.VAN_DER_WAALS or now == col.BRIDGE:
+                        if now == col.BRIDGE:
+                            pull = bridge(-overlap, r, table, p)
+                        else:
+                            pull = attraction(-overlap, r, table, p)
                         load[i, 0] -= pull * nx
                         load[i, 1] -= pull * ny
                         load[i, 2] -= pull * nz
+                        on_wall[w, 0] += pull * nx
+                        on_wall[w, 1] += pull * ny
+                        on_wall[w, 2] += pull * nz
                     continue
                 qx, qy, qz = x - distance * nx, y - distance * ny, z - distance * nz
                 if turn == 1 and _part_of(seen, met, number, wall, s, qx, qy, qz, r):
@@ -255,7 +266,7 @@ def wall_forces(
                         touch[k] = 0
                         forget(history, k)
                     continue
-                if not touch[k]:
+                if touch[k] != col.TOUCH:
                     _take_over(first[i], first[i + 1], k, surface, wall, kinds, data,
                                x, y, z, r, touch, history)  # fmt: skip
                 touch[k] = 1

@@ -116,6 +116,18 @@ def restore(simulation: Simulation, path: str | os.PathLike[str]) -> dict[str, A
     return dict(numbers["extra"])
 
 
+def kept_with(path: str | os.PathLike[str]) -> dict[str, Any] | None:
+    """What was kept beside the state of a checkpoint; None where there is no whole one."""
+    try:
+        with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as stored:
+            numbers = json.loads(str(stored["numbers"]))
+            for name in stored.files:
+                stored[name]  # its check sum
+        return dict(numbers["extra"])
+    except Exception:  # absent, cut, or of another kind
+        return None
+
+
 def _digest(simulation: Simulation) -> str:
     """SHA-256 of what decides how a state goes on, besides the state itself."""
     law, lists = simulation._law, simulation._lists

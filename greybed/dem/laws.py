@@ -23,6 +23,8 @@ COHESION = {
     "sjkr": _columns.SJKR,
     "dmt": _columns.DMT,
     "van-der-waals": _columns.VAN_DER_WAALS,
+    "jkr": _columns.JKR,
+    "liquid-bridge": _columns.LIQUID,
 }
 
 
@@ -41,9 +43,13 @@ class ContactLaw:
         Constant directional torque :math:`\mu_r R^* F`; elastic-plastic spring and dashpot with
         :math:`k_r = 2.25 k_n (\mu_r R^*)^2`; the same without dashpot and with
         :math:`k_r = k_t R^{*2}` [4]_, [5]_.
-    cohesion : {"none", "sjkr", "dmt", "van-der-waals"}
+    cohesion : {"none", "sjkr", "dmt", "van-der-waals", "jkr", "liquid-bridge"}
         Energy density times the disc of the contact; constant pull-off force
-        :math:`4\pi\gamma R^*` [6]_; Hamaker's force :math:`A R^*/(6 h^2)` across gaps [7]_.
+        :math:`4\pi\gamma R^*` [6]_; Hamaker's force :math:`A R^*/(6 h^2)` across gaps [7]_; a neck
+        that pulls with up to :math:`3\pi\gamma R^*` and holds on a little way beyond the contact
+        [8]_ (``hertz`` only); capillary bridges that form at contact, pull with
+        :math:`2\pi R\,\sigma\cos\theta/(1 + 1.05 S + 2.5 S^2)`, R twice :math:`R^*`, S the gap
+        times :math:`\sqrt{R/V}` [9]_, and break at a gap of :math:`(1 + \theta/2) V^{1/3}` [10]_.
     limit_force : bool
         Cut off the attraction that damping makes at the end of a contact. The damping is then
         another one, such that the restitution stays what was asked for.
@@ -60,6 +66,9 @@ class ContactLaw:
        doi 10.1061/(ASCE)0733-9399(1998)124:3(285).
     .. [6] Derjaguin, Muller & Toporov, J. Colloid Interface Sci. 53 (1975) 314.
     .. [7] Hamaker, Physica 4 (1937) 1058, doi 10.1016/S0031-8914(37)80203-7.
+    .. [8] Johnson, Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301, doi 10.1098/rspa.1971.0141.
+    .. [9] Willett, Adams, Johnson & Seville, Langmuir 16 (2000) 9396, doi 10.1021/la000657y.
+    .. [10] Lian, Thornton & Adams, J. Colloid Interface Sci. 161 (1993) 138.
     """
 
     normal: str = "hertz"
@@ -74,6 +83,9 @@ class ContactLaw:
                 raise InputError(
                     f"{part} = {getattr(self, part)!r} is unknown; give one of {', '.join(known)}."
                 )
+
+        if self.cohesion == "jkr" and self.normal != "hertz":
+            raise InputError(f"cohesion = 'jkr' needs normal = 'hertz', not {self.normal!r}.")
 
     @property
     def columns(self) -> int:

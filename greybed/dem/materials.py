@@ -73,10 +73,12 @@ class Contact:
     rolling_damping : float
         Share of critical damping while the rolling spring holds (EPSD), 0 to 1 [-].
     cohesion : float
-        At least 0: energy density [J/m3] (SJKR), surface energy [J/m2] (DMT) or Hamaker constant
-        [J] (van der Waals).
+        At least 0: energy density [J/m3] (SJKR), surface energy [J/m2] (DMT, JKR), Hamaker
+        constant [J] (van der Waals) or surface tension [N/m] (liquid bridges).
     nearest, reach : float
         Gaps at which van der Waals forces stop to grow and end [m].
+    bridge_volume, contact_angle : float
+        Of liquid bridges: volume of each [m3], and angle of liquid and solid, 0 to pi/2 [rad].
     stiffness, tangential_ratio : float
         Of linear and hysteretic laws: normal stiffness [N/m], and tangential over normal [-].
     """
@@ -89,6 +91,8 @@ class Contact:
     cohesion: float = 0.0
     nearest: float = 0.0
     reach: float = 0.0
+    bridge_volume: float = 0.0
+    contact_angle: float = 0.0
     stiffness: float | None = None
     tangential_ratio: float = 2.0 / 7.0
 
@@ -117,6 +121,12 @@ class Contact:
             raise InputError(
                 f"{who}: van der Waals cohesion needs 0 < nearest < reach [m], not "
                 f"{self.nearest:g} and {self.reach:g}; a usual nearest gap is 0.4e-9."
+            )
+        bridged = self.bridge_volume > 0.0 and self.contact_angle < 0.5 * math.pi
+        if law.cohesion == "liquid-bridge" and self.cohesion > 0.0 and not bridged:
+            raise InputError(
+                f"{who}: liquid bridges need bridge_volume above 0 [m3] and contact_angle below "
+                f"pi/2 [rad], not {self.bridge_volume:g} and {self.contact_angle:g}."
             )
         return self
 
@@ -209,4 +219,8 @@ def _row(a: Material, b: Material, contact: Contact, law: ContactLaw) -> Array:
     row[_columns.COHESION] = contact.cohesion
     row[_columns.NEAREST] = contact.nearest
     row[_columns.REACH] = contact.reach
+    if law.cohesion == "liquid-bridge":
+        row[_columns.COHESION] = contact.cohesion * math.cos(contact.contact_angle)
+        row[_columns.NEAREST] = max(contact.bridge_volume, 1e-300)
+        row[_columns.REACH] = (1.0 + 0.5 * contact.contact_angle) * math.cbrt(contact.bridge_volume)
     return row

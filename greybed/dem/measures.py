@@ -270,7 +270,8 @@ def segregation(
         Of each kind in the mass of each compartment [-]; NaN where there is none.
     intensity : float
         Variance of the share of kind 0, weighted by mass, over the p (1 - p) of complete
-        segregation: 0 (mixed) to 1 [-] (Danckwerts, Appl. Sci. Res. A3, 1952, 279).
+        segregation: 0 (mixed) to 1 [-] (Danckwerts, Appl. Sci. Res. A3, 1952, 279). NaN where the
+        compartments are empty.
     """
     x, m, k = np.asarray(centres)[:, axis], np.asarray(masses), np.asarray(kinds, dtype=np.int64)
     cells = len(np.asarray(edges)) - 1
@@ -281,6 +282,8 @@ def segregation(
     total = table.sum(axis=1)
     with np.errstate(invalid="ignore"):
         shares = table / total[:, None]
+    if not total.any():
+        return shares, math.nan
     whole = table.sum(axis=0) / total.sum()
     used = total > 0.0
     variance = float(total[used] @ (shares[used, 0] - whole[0]) ** 2 / total.sum())

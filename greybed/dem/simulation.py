@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from greybed.core.errors import InputError
 from greybed.core.processors import available_threads
-from greybed.dem import _columns, _step
+from greybed.dem import _cohesion, _columns, _step
 from greybed.dem.laws import COHESION, NORMAL, ROLLING, ContactLaw
 from greybed.dem.lists import Lists
 from greybed.dem.materials import Contact, Material, pair_tables
@@ -124,11 +124,7 @@ class Simulation(Population):
         self._state = _step.State(
             place, motion, np.zeros((n, 8)), kind, place[:, :3].copy(), np.zeros(n, bool)
         )
-        reach = (
-            float(self._law.table[:, _columns.REACH].max())
-            if self.law.cohesion == "van-der-waals"
-            else 0.0
-        )
+        reach = self._reach(float(place[:, 3].max()))
         self._lists = Lists(
             self._state,
             surfaces_of(walls),
@@ -218,6 +214,15 @@ class Simulation(Population):
             NORMAL[law.normal], ROLLING[law.rolling], COHESION[law.cohesion], law.limit_force,
             row, table,
         )  # fmt: skip
+
+    def _reach(self, largest: float) -> float:
+        """Gap across which two particles may pull at each other [m]."""
+        table = self._law.table
+        if self.law.cohesion in ("van-der-waals", "liquid-bridge"):
+            return float(table[:, _columns.REACH].max())
+        if self.law.cohesion == "jkr":  # the widest neck is that of the largest one on a wall
+            return max(_cohesion.neck(largest, table, p) for p in range(len(table)))
+        return 0.0
 
     def _checked_step(self, time_step: float | None) -> float:
         if time_step is None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from greybed.dem import _step
+from greybed.dem import _columns, _step
 from greybed.dem.lists import Lists
 from greybed.dem.particles import Energies
 
@@ -27,7 +29,7 @@ class Views:
         """Time since the start [s]."""
         return self.steps * self.time_step
 
-    def _in_order(self, values: NDArray[np.generic]) -> Array:
+    def _in_order(self, values: NDArray[Any]) -> NDArray[Any]:
         result = np.empty_like(values)
         result[self._lists.ident] = values
         return result
@@ -41,6 +43,11 @@ class Views:
     def radii(self) -> Array:
         """Radii, shape (n,) [m]."""
         return self._in_order(self._state.place[:, 3])
+
+    @property
+    def kinds(self) -> Index:
+        """Numbers of the materials, shape (n,)."""
+        return self._in_order(self._state.kind)
 
     @property
     def velocities(self) -> Array:
@@ -87,7 +94,13 @@ class Views:
     def contacts(self) -> Index:
         """Pairs in contact, shape (m, 2), numbers of the input."""
         near = self._lists.near
-        return self._lists.pairs(near.touch[: near.first[-1]].astype(bool))
+        return self._lists.pairs(near.touch[: near.first[-1]] == _columns.TOUCH)
+
+    @property
+    def bridges(self) -> Index:
+        """Pairs that a liquid bridge joins across a gap, shape (m, 2), numbers of the input."""
+        near = self._lists.near
+        return self._lists.pairs(near.touch[: near.first[-1]] == _columns.BRIDGE)
 
     @property
     def coordination(self) -> float:

@@ -109,6 +109,7 @@ def bed_picture(
     cut: bool = True,
     limits: tuple[float, float] | None = None,
     colours: ListedColormap = HEAT,
+    stage: ArrayLike | None = None,
 ) -> NDArray[np.uint8]:
     """Picture of a bed coloured by a value per sphere, on a transparent ground.
 
@@ -128,6 +129,8 @@ def bed_picture(
         Values at the ends of the colours; otherwise those of ``values``.
     colours : colormap
         Colours from the lower to the upper limit.
+    stage : array_like, shape (2, 3), optional
+        Corners of a box that fills the picture, for frames of a film; else the spheres do [m].
 
     Returns
     -------
@@ -151,6 +154,10 @@ def bed_picture(
     shown = in_view(packing, view) if cut else np.ones(len(packing), dtype=bool)
     bed = Packing(packing.centres[shown], packing.radii[shown], source=packing.source)
     camera = _Camera.around(view, bed.centres, bed.radii)
+    if stage is not None:
+        box = np.asarray(stage, dtype=np.float64)
+        corners = np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
+        camera = _Camera.around(view, corners, np.zeros(len(corners)))
     if height is None:
         size = camera.high - camera.low
         height = max(1, round(width * float(size[1] / size[0])))

@@ -244,12 +244,16 @@ def test_a_swallowed_ctrl_c_is_sent_again(monkeypatch):
     hook(SimpleNamespace(exc_type=ValueError))
     assert len(others) == 1
     caught = False
+    # A shell that runs the tests in the background may have turned Ctrl-C off for them.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         hook(SimpleNamespace(exc_type=KeyboardInterrupt))
         for _ in range(500):  # short, for this kind of signal ends no sleep
             time.sleep(0.01)
     except KeyboardInterrupt:
         caught = True
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert caught
 
 

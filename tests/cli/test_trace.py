@@ -17,10 +17,10 @@ import pytest
 from greybed.cli.main import main
 from greybed.cli.trace import parse_walls
 from greybed.core import Cone, Cylinder, Disc, InputError, Packing, Plane, Polygon, box_walls
+from greybed.core.sizes import Uniform
 from greybed.core.writers import write_packing
 from greybed.datasets.factors_file import read_factors
 from greybed.datasets.generate import random_packing
-from greybed.datasets.sizes import Uniform
 from greybed.datasets.tracing import STATE
 from greybed.raytrace import view_factors
 

@@ -8,9 +8,9 @@ from greybed.closures.viewfactor.bed import bed_factors, inner_fraction
 from greybed.closures.viewfactor.closure import ViewFactorClosure
 from greybed.closures.viewfactor.markers import pencil_lines
 from greybed.core import Packing, Plane, box_walls
+from greybed.core.sizes import LogNormal
 from greybed.datasets.generate import random_packing
 from greybed.datasets.lattices import lattice
-from greybed.datasets.sizes import LogNormal
 from greybed.raytrace import view_factors
 
 

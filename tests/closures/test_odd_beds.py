@@ -7,8 +7,8 @@ from greybed.closures import ViewFactorClosure
 from greybed.closures.viewfactor.bed import inner_fraction
 from greybed.core import GreybedError, InputError, Packing
 from greybed.core.packing import RESOLUTION
+from greybed.core.sizes import parse_sizes
 from greybed.datasets.generate import random_packing
-from greybed.datasets.sizes import parse_sizes
 from greybed.raytrace import view_factors
 
 

@@ -5,9 +5,9 @@ import pytest
 
 from greybed.core import InputError, Packing
 from greybed.core.rows import localised
+from greybed.core.sizes import Uniform
 from greybed.coupling import Rows, radiative_network
 from greybed.datasets.generate import random_packing
-from greybed.datasets.sizes import Uniform
 from greybed.raytrace import smoothed, view_factors
 
 DIAMETER = 3e-3

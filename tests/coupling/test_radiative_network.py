@@ -5,10 +5,10 @@ import pytest
 from scipy.sparse import csr_matrix
 
 from greybed.core import InputError, Plane
+from greybed.core.sizes import Discrete
 from greybed.coupling import Rows, net_radiation, pairwise_network, radiative_network
 from greybed.datasets.generate import random_packing
 from greybed.datasets.lattices import lattice
-from greybed.datasets.sizes import Discrete
 from greybed.raytrace import exchange_factors, view_factors
 
 SIGMA = 5.670374419e-8

@@ -14,12 +14,12 @@ import pytest
 
 from greybed.cli.main import main
 from greybed.core import InputError, Plane
+from greybed.core.sizes import Uniform
 from greybed.core.writers import write_packing
 from greybed.datasets import factors_file, tracing
 from greybed.datasets.containers import Box
 from greybed.datasets.factors_file import block_of, read_factors, write_blocks, write_factors
 from greybed.datasets.generate import random_packing
-from greybed.datasets.sizes import Uniform
 from greybed.datasets.tracing import Settings, trace_in_blocks
 from greybed.raytrace import view_factors
 

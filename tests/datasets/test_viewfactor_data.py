@@ -5,6 +5,7 @@ import pytest
 
 from greybed.core import InputError
 from greybed.core.exact import pair_factor
+from greybed.core.sizes import LogNormal
 from greybed.datasets import viewfactor
 from greybed.datasets.beds import (
     BEDS,
@@ -15,7 +16,6 @@ from greybed.datasets.beds import (
     WalledBed,
 )
 from greybed.datasets.generate import random_packing
-from greybed.datasets.sizes import LogNormal
 from greybed.datasets.tables import exchange_rows_of, wall_rows_of
 from greybed.datasets.viewfactor import (
     COLUMNS,

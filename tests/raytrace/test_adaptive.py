@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from greybed.core import InputError, Packing
+from greybed.core.sizes import Uniform
 from greybed.datasets.containers import Box
 from greybed.datasets.generate import random_packing
-from greybed.datasets.sizes import Uniform
 from greybed.raytrace import view_factors
 
 

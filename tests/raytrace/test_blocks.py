@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from greybed.core import Packing
+from greybed.core.sizes import Mono, Uniform
 from greybed.datasets.generate import random_packing
 from greybed.datasets.lattices import lattice
-from greybed.datasets.sizes import Mono, Uniform
 from greybed.raytrace import scene, tally
 
 PACKINGS = {

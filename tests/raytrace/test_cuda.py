@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from greybed.core import Cylinder, Disc, InputError, Packing, Plane, box_walls
+from greybed.core.sizes import Uniform
 from greybed.datasets.generate import random_packing
-from greybed.datasets.sizes import Uniform
 from greybed.raytrace import _single, cuda, tally, view_factors
 
 FIELDS = ("emitter", "key", "count", "squares", "buried")

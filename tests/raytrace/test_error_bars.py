@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from greybed.core import Packing
+from greybed.core.sizes import Uniform
 from greybed.datasets.containers import Box
 from greybed.datasets.generate import random_packing
-from greybed.datasets.sizes import Uniform
 from greybed.raytrace import standard_error, view_factors
 
 REPLICATES = 200

@@ -7,9 +7,9 @@ import pytest
 
 from greybed.core import InputError, Packing
 from greybed.core.exact import exact_view_factor
+from greybed.core.sizes import Uniform
 from greybed.datasets.generate import random_packing
 from greybed.datasets.lattices import lattice
-from greybed.datasets.sizes import Uniform
 from greybed.raytrace import pair_factors, view_factors
 
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from greybed.core import Cylinder, Packing, Plane
+from greybed.core.sizes import Uniform
 from greybed.datasets.generate import random_packing
-from greybed.datasets.sizes import Uniform
 from greybed.raytrace import tally, view_factors
 
 WALLS = [

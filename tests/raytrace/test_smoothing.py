@@ -7,9 +7,9 @@ import pytest
 from scipy import sparse
 
 from greybed.core import InputError, Packing
+from greybed.core.sizes import Uniform
 from greybed.datasets.containers import Box
 from greybed.datasets.generate import random_packing
-from greybed.datasets.sizes import Uniform
 from greybed.raytrace import smoothed, smoothing, view_factors
 
 

@@ -1,7 +1,7 @@
-"""Effects between particles: closed forms for a ``python`` model, and what a DEM case will switch.
+"""Effects between particles: closed forms for a ``python`` model, and what only cases switch.
 
-There is no DEM engine in the project yet. ``CLOSED`` holds the effects that have a closed form;
-the three in ``NEEDS_ENGINE`` have none and wait for a case that resolves contacts.
+``CLOSED`` holds the effects that have a closed form; the three in ``NEEDS_ENGINE`` have none and
+need a case that resolves contacts.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import difflib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,9 +17,14 @@ from greybed.residual.catalogue.particles import NEEDS_ENGINE
 from greybed.residual.effect import Array, Columns
 from greybed.residual.model import ForwardModel, ModelSpec
 from greybed.residual.models.emulator import Emulator, Knob
-from greybed.residual.models.runner import RUNNERS, Runner, Switch
+from greybed.residual.models.particle_runner import ParticleRunner
+from greybed.residual.models.runner import Runner, Switch, ThermalRunner
 from greybed.residual.study import Table
 
+RUNNERS: dict[str, Callable[[Path, str, Path], Runner]] = {
+    ThermalRunner.kind: ThermalRunner,
+    ParticleRunner.kind: ParticleRunner,
+}
 OPTIONS = ("file", "output", "inputs", "transform", "seeds", "cache")
 MOST_NEW = 64  # conditions beside those of the table that are worth runs
 
@@ -103,7 +108,8 @@ class CaseModel(ForwardModel):
         return {str(name): str(key) for name, key in inputs.items()}
 
     def _choose(self) -> None:
-        self.effects, self.unavailable = {}, dict.fromkeys(NEEDS_ENGINE, NO_ENGINE)
+        absent = [name for name in NEEDS_ENGINE if name not in self._switches]
+        self.effects, self.unavailable = {}, dict.fromkeys(absent, self._runner.lacks)
         for name in self.spec.effects:
             if name not in self._switches:
                 raise InputError(
@@ -210,9 +216,6 @@ class CaseModel(ForwardModel):
             self._switches[name].apply(content, amplitude)
         self._runner.relocate(content)
         return content
-
-
-NO_ENGINE = "the case resolves no contacts in time"
 
 
 def _text(spec: ModelSpec, key: str) -> str:

@@ -46,6 +46,7 @@ class Runner(ABC):
 
     kind: ClassVar[str]
     paths: ClassVar[tuple[str, ...]]  # dotted keys that name files
+    lacks: ClassVar[str] = "the case resolves no contacts in time"
 
     def __init__(self, path: Path, output: str, cache: Path) -> None:
         self.path, self.output, self.cache = path, output, cache
@@ -217,6 +218,3 @@ def _scatters(content: Mapping[str, Any]) -> str | None:
     if content.get("solve", {}).get("mode", "steady") != "steady":
         return "it works in steady cases only"
     return None
-
-
-RUNNERS: dict[str, Callable[[Path, str, Path], Runner]] = {ThermalRunner.kind: ThermalRunner}

@@ -17,7 +17,10 @@ from greybed.core.packing import RADII
 
 Array = NDArray[np.float64]
 
-FORMS = "mono:1.5mm, lognormal:1.5mm,1.3, uniform:1mm,2mm or discrete:1mm=0.3,2mm=0.7"
+FORMS = (
+    "mono:1.5mm, lognormal:1.5mm,1.3, uniform:1mm,2mm, rosin-rammler:1.5mm,3 or "
+    "discrete:1mm=0.3,2mm=0.7"
+)
 
 
 def _check_positive(value: float, what: str, unit: str) -> None:
@@ -53,6 +56,24 @@ class Sizes(ABC):
         if n < 1:
             raise InputError(f"number of spheres = {n} [-] must be at least 1; raise it.")
         return self.quantiles((np.arange(n) + 0.5) / n)
+
+    def sampled(self, n: int, rng: np.random.Generator) -> Array:
+        """Radii of ``n`` spheres drawn at random, shape (n,) [m]."""
+        return self.quantiles(rng.uniform(1e-9, 1.0 - 1e-9, n))
+
+    def by_mass(self, share: float) -> float:
+        """Radius below which a share of the mass lies: 0.1, 0.5, 0.9 for half of D10, D50, D90 [m].
+
+        Raises
+        ------
+        InputError
+            If the share is not between 0 and 1.
+        """
+        if not 0.0 < share < 1.0:
+            raise InputError(f"share = {share:g} [-] must be above 0 and below 1.")
+        radii = self.quantiles((np.arange(20_000) + 0.5) / 20_000)
+        mass = np.cumsum(radii**3)
+        return float(radii[np.searchsorted(mass, share * mass[-1])])
 
 
 @dataclass(frozen=True)
@@ -128,6 +149,35 @@ class LogNormal(Sizes):
             f"log-normal spheres of median radius {self.median:g} m and geometric standard "
             f"deviation {self.geometric_sd:g}"
         )
+
+
+@dataclass(frozen=True)
+class RosinRammler(Sizes):
+    """Mass above radius r: exp(-(r / scale)^spread), between the mass shares 1 and 99 %.
+
+    Rosin & Rammler, J. Inst. Fuel 7 (1933) 29.
+    """
+
+    scale: float  # radius above which 36.8 % of the mass lies [m]
+    spread: float  # the larger, the narrower, 1 to 20 [-]
+
+    def __post_init__(self) -> None:
+        _check_positive(self.scale, "scale radius", "m")
+        if not 1.0 <= self.spread <= 20.0:
+            raise InputError(
+                f"spread = {self.spread:g} [-] is outside [1, 20]; ground solids have 1 to 4."
+            )
+
+    def quantiles(self, p: Array) -> Array:
+        """Radius at each share ``p``, shape (n,) [m]."""
+        # Shares of the mass, each with its radius; a share of mass has the number over r^3.
+        mass = 0.01 + 0.98 * (np.arange(4096) + 0.5) / 4096
+        radii = self.scale * (-np.log1p(-mass)) ** (1.0 / self.spread)
+        number = np.cumsum(radii**-3.0)
+        return np.interp(p, (number - 0.5 * radii**-3.0) / number[-1], radii)
+
+    def __str__(self) -> str:
+        return f"Rosin-Rammler spheres of scale radius {self.scale:g} m and spread {self.spread:g}"
 
 
 @dataclass(frozen=True)
@@ -213,6 +263,11 @@ def _lognormal(words: list[str], length: Callable[[str], float]) -> Sizes:
     return LogNormal(length(median), _number(sd, "geometric standard deviation"))
 
 
+def _rosin_rammler(words: list[str], length: Callable[[str], float]) -> Sizes:
+    scale, spread = words
+    return RosinRammler(length(scale), _number(spread, "spread"))
+
+
 def _uniform(words: list[str], length: Callable[[str], float]) -> Sizes:
     smallest, largest = words
     return Uniform(length(smallest), length(largest))
@@ -224,7 +279,10 @@ def _discrete(words: list[str], length: Callable[[str], float]) -> Sizes:
     return Discrete(sizes, tuple(_number(share, "mass fraction") for _, share in pairs))
 
 
-_PARSERS = {"mono": _mono, "lognormal": _lognormal, "uniform": _uniform, "discrete": _discrete}
+_PARSERS = {
+    "mono": _mono, "lognormal": _lognormal, "uniform": _uniform, "discrete": _discrete,
+    "rosin-rammler": _rosin_rammler,
+}  # fmt: skip
 
 
 def parse_sizes(text: str) -> Sizes:
@@ -233,8 +291,9 @@ def parse_sizes(text: str) -> Sizes:
     Parameters
     ----------
     text : str
-        ``mono:RADIUS``, ``lognormal:MEDIAN,GEOMETRIC_SD``, ``uniform:SMALLEST,LARGEST`` or
-        ``discrete:RADIUS=MASS_FRACTION,...``; every radius with its unit.
+        ``mono:RADIUS``, ``lognormal:MEDIAN,GEOMETRIC_SD``, ``uniform:SMALLEST,LARGEST``,
+        ``rosin-rammler:RADIUS,SPREAD`` or ``discrete:RADIUS=MASS_FRACTION,...``; every radius
+        with its unit.
 
     Raises
     ------

@@ -1,0 +1,238 @@
+"""``greybed simulate`` of particles: progress, frames, checkpoints, history and summary."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from greybed.core.packing import Packing
+    from greybed.dem.runner import ParticleRun
+
+CHECKPOINT = "checkpoint.npz"
+
+
+def run_particles(options: argparse.Namespace) -> int:
+    """Run the case that ``options`` names, from its checkpoint if there is one; returns 0."""
+    from greybed.core.errors import InputError
+    from greybed.core.files import output_folder, sha256_of, sole_writer, write_summary
+    from greybed.core.progress import progress
+    from greybed.core.readers import read_packing
+    from greybed.core.writers import write_packing
+    from greybed.dem.case import FileTable, MeshTable, load_particle_case
+    from greybed.dem.checkpoint import kept_with
+    from greybed.dem.results import results_of
+    from greybed.dem.runner import ParticleRun
+
+    case = load_particle_case(options.case)
+    files = {k: t.file for k, t in enumerate(case.particles) if isinstance(t, FileTable)}
+    inputs = [options.case, *files.values()]
+    inputs += [wall.file for wall in case.wall if isinstance(wall, MeshTable)]
+    key = "".join(sha256_of(path) for path in inputs)
+    folder = output_folder(options.out)
+    checkpoint = folder / CHECKPOINT
+    with sole_writer(folder / ".simulate.lock"):
+        run = ParticleRun(
+            case, {k: read_packing(path) for k, path in files.items()}, threads=options.threads
+        )
+        found = 0
+        kept = kept_with(checkpoint)
+        if kept is not None and kept.get("key") == key:
+            run.restore(checkpoint)
+            found = run.simulation.steps
+        frames = _Frames(run, folder, options.movie)
+        every = case.output.checkpoints or 0.1 * case.duration
+        apart = max(1, round(every / run.simulation.time_step))
+        begin, moved = time.perf_counter(), 0
+        with progress(run.steps, "time steps", show=not options.quiet) as advance:
+            advance(found)
+            if not found:
+                frames.write()
+            try:
+                for done in run.go_on():
+                    moved += done * len(run.simulation.radii)
+                    step = run.simulation.steps
+                    if frames.due(step, done):
+                        frames.write()
+                    if step // apart > (step - done) // apart or step == run.steps:
+                        run.save(checkpoint, key=key)
+                        _write_history(folder / "history.csv", run)
+                    advance(done)
+            except KeyboardInterrupt:
+                if not run.simulation._pending:
+                    run.save(checkpoint, key=key)
+                raise
+            except InputError as error:
+                last = f"The last good state is in {checkpoint}." if checkpoint.exists() else ""
+                raise InputError(f"{options.case}: {error} {last}".strip()) from None
+        seconds = time.perf_counter() - begin
+        _write_history(folder / "history.csv", run)
+        final = frames.packing()
+        write_packing(final, folder / "final.h5")
+        write_packing(final, folder / "final.vtu", fields=frames.fields())
+        results: dict[str, Any] = {
+            **results_of(run),
+            "steps_found_from_stopped_run": found,
+            "seconds": seconds,
+            "particle_steps_per_second": moved / seconds if moved else None,
+            "threads": run.simulation.threads,
+        }
+        frames.finish()
+        _draw(folder, run, frames)
+        summary = write_summary(folder, "simulate", results, *inputs, seed=case.seed)
+    _say(results, found, folder)
+    print(f"wrote {summary}")
+    return 0
+
+
+class _Frames:
+    """Frames of a run as VTU files with a ParaView collection, and as pictures for a film."""
+
+    def __init__(self, run: ParticleRun, folder: Path, movie: bool) -> None:
+        self.run, self.folder, self.movie = run, folder / "frames", movie
+        every = run.case.output.frames
+        self.every = None if every is None else max(1, round(every / run.simulation.time_step))
+        self.stage: Any = None
+
+    def due(self, step: int, done: int) -> bool:
+        """Whether a frame belongs to the stretch that has just been run."""
+        return self.every is not None and step // self.every > (step - done) // self.every
+
+    def packing(self) -> Packing:
+        """The particles as a packing."""
+        from greybed.core.packing import Packing
+
+        sim = self.run.simulation
+        return Packing(sim.centres, sim.radii, source=f"step {sim.steps}")
+
+    def fields(self) -> dict[str, Any]:
+        """Numbers of each particle, for a frame."""
+        import numpy as np
+
+        sim = self.run.simulation
+        return {
+            "velocity [m/s]": sim.velocities,
+            "spin [rad/s]": sim.spins,
+            "speed [m/s]": np.sqrt((sim.velocities**2).sum(axis=1)),
+            "label": sim.labels.astype(np.float64),
+            "material": sim.kinds.astype(np.float64),
+        }
+
+    def write(self) -> None:
+        """Write the frame of now."""
+        if self.every is None:
+            return
+        from greybed.core.writers import write_packing
+
+        self.folder.mkdir(exist_ok=True)
+        name = f"frame_{self.run.simulation.steps:010d}"
+        write_packing(self.packing(), self.folder / f"{name}.vtu", fields=self.fields())
+        if self.movie:
+            from greybed.report.particles import frame_picture, write_frame
+
+            picture = frame_picture(self.packing(), self.values(), self._stage(), self.limits())
+            write_frame(self.folder / f"{name}.png", picture)
+
+    def finish(self) -> None:
+        """Write the collection of all frames, and the film."""
+        if self.every is None:
+            return
+        from greybed.core.files import atomic_path
+
+        dt = self.run.simulation.time_step
+        frames = sorted(self.folder.glob("frame_*.vtu"))
+        rows = "".join(
+            f'<DataSet timestep="{int(f.stem[6:]) * dt:.9g}" file="frames/{f.name}"/>\n'
+            for f in frames
+        )
+        with atomic_path(self.folder.parent / "frames.pvd") as part:
+            part.write_text(
+                '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
+                f"{rows}</Collection>\n</VTKFile>\n"
+            )
+        pictures = sorted(self.folder.glob("frame_*.png"))
+        if self.movie and pictures:
+            from greybed.report.particles import write_film
+
+            write_film(self.folder.parent / "movie.gif", pictures, 6.0)
+
+    def values(self) -> Any:
+        """What pictures are coloured by: the material where there are several, else the height."""
+        sim = self.run.simulation
+        if len(set(sim.kinds.tolist())) > 1:
+            return sim.kinds
+        # By the label: one sees what was where at the start.
+        return sim.labels
+
+    def limits(self) -> tuple[float, float]:
+        values = self.values()
+        return float(min(values.min(), 0)), float(max(values.max(), 1))
+
+    def _stage(self) -> Any:
+        """The same box for all frames: what particles have filled, or will be put into."""
+        import numpy as np
+
+        from greybed.dem.case import FileTable
+
+        if self.stage is None:
+            sim, case = self.run.simulation, self.run.case
+            low = [(sim.centres - sim.radii[:, None]).min(axis=0)]
+            high = [(sim.centres + sim.radii[:, None]).max(axis=0)]
+            for table in case.particles:
+                if not isinstance(table, FileTable):
+                    low.append(np.array(table.lower))
+                    high.append(np.array(table.upper))
+            self.stage = [np.min(low, axis=0), np.max(high, axis=0)]
+        return self.stage
+
+
+def _write_history(path: Path, run: ParticleRun) -> None:
+    from greybed.core.files import atomic_path
+
+    rows = run.tally.history
+    with atomic_path(path) as part, open(part, "w") as stream:
+        stream.write(",".join(rows[0]) + "\n")
+        for row in rows:
+            stream.write(",".join(f"{value:.9g}" for value in row.values()) + "\n")
+
+
+def _draw(folder: Path, run: ParticleRun, frames: _Frames) -> None:
+    """A picture of the end, and plots of the history."""
+    import numpy as np
+
+    from greybed.report.particles import frame_picture, write_frame, write_history
+
+    packing = frames.packing()
+    x, r = packing.centres, packing.radii[:, None]
+    stage = np.array([(x - r).min(axis=0), (x + r).max(axis=0)])
+    picture = frame_picture(packing, frames.values(), stage, frames.limits())
+    write_frame(folder / "final.png", picture)
+    write_history(folder / "history.png", run.tally.history)
+
+
+def _say(results: dict[str, Any], found: int, folder: Path) -> None:
+    if found:
+        print(f"went on from a stopped run at step {found}")
+    rate = results["particle_steps_per_second"]
+    print(
+        f"{results['particles']} particles after {results['simulated_s']:.4g} s "
+        f"({results['steps']} steps of {results['time_step_s']:.3g} s"
+        + (f", {1e-6 * rate:.2f} million particle steps per second)" if rate else ")")
+    )
+    print(
+        f"height {results['height_m']:.4g} m, coordination {results['coordination']:.2f}, kinetic "
+        f"energy {results['kinetic_energy_J']:.3g} J"
+    )
+    for name, sink in results["sinks"].items():
+        flow = sink["mass_kg_per_s"]
+        print(
+            f"{name}: {sink['mass_kg']:.4g} kg, {sink['particles']} particles"
+            + (f", {flow:.4g} kg/s" if flow is not None else "")
+        )
+    for name, found_ in results["measures"].items():
+        for key, value in found_.items():
+            if isinstance(value, float):
+                print(f"{name}: {key} {value:.4g}")
+    print(f"results in {folder}")

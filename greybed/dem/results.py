@@ -1,0 +1,90 @@
+"""Results of a run of particles: what the case asks to be measured at the end, flows from sinks."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from greybed.core.errors import InputError
+from greybed.dem import measures
+from greybed.dem.case import CompartmentsTable, PileTable
+from greybed.dem.runner import ParticleRun
+
+
+def results_of(run: ParticleRun) -> dict[str, Any]:
+    """Plain numbers of a run, with units in their names, for ``summary.json``."""
+    sim, case, tally = run.simulation, run.case, run.tally
+    last = tally.history[-1]
+    energy = sim.energies
+    return {
+        "particles": 0 if run.emptied else len(sim.radii),
+        "emptied": run.emptied,
+        "steps": sim.steps,
+        "time_step_s": sim.time_step,
+        "simulated_s": sim.time,
+        "mass_kg": float(sim.masses.sum()),
+        "height_m": last["height [m]"],
+        "coordination": last["coordination [-]"],
+        "kinetic_energy_J": energy.kinetic,
+        "inserted": list(tally.inserted),
+        "bytes_per_particle": sim.bytes_per_particle,
+        "sinks": {
+            sink.name: {
+                "mass_kg": tally.sunk[k],
+                "particles": tally.taken[k],
+                **_flow(run, sink.name),
+            }
+            for k, sink in enumerate(case.sink)
+        },
+        "measures": {table.name: _measure(run, table) for table in case.measure},
+    }
+
+
+def _flow(run: ParticleRun, sink: str) -> dict[str, float | None]:
+    """Mean rates into a sink while it takes its second to eighth tenth."""
+    rows = run.tally.history
+    time = np.array([row["time [s]"] for row in rows])
+    rates: dict[str, float | None] = {}
+    for name, unit, key in (("mass", "kg", "mass_kg_per_s"), ("particles", "-", "per_second")):
+        total = np.array([row[f"{name} in {sink} [{unit}]"] for row in rows])
+        inside = (total >= 0.1 * total[-1]) & (total <= 0.8 * total[-1])
+        rates[key] = None
+        if total[-1] > 0.0 and inside.sum() >= 3:
+            rates[key] = float(np.polyfit(time[inside], total[inside], 1)[0])
+    return rates
+
+
+def _measure(run: ParticleRun, table: Any) -> dict[str, Any]:
+    sim = run.simulation
+    x, r = sim.centres, sim.radii
+    if isinstance(table, PileTable):
+        chosen = x[:, 2] > table.above
+        if not chosen.any():
+            raise InputError(f"measure {table.name!r}: no particle is above {table.above:g} [m].")
+        axis = {"heap": None, "x": 0, "y": 1}[table.axis]
+        profile = measures.pile_profile(x[chosen], r[chosen], table.width, axis=axis)
+        known = np.isfinite(profile.height)
+        found: dict[str, Any] = {
+            "position_m": profile.position[known].tolist(),
+            "height_m": profile.height[known].tolist(),
+        }
+        try:
+            angle, error = profile.slope()
+        except InputError as refusal:
+            return {**found, "angle_deg": None, "why": str(refusal)}
+        return {**found, "angle_deg": angle, "angle_stderr_deg": error}
+    if isinstance(table, CompartmentsTable):
+        edges = np.linspace(table.lower, table.upper, table.count + 1)
+        shares, intensity = measures.segregation(
+            x, sim.masses, sim.kinds, edges, axis="xyz".index(table.axis)
+        )
+        return {
+            "edges_m": edges.tolist(),
+            "mass_shares": [[None if math.isnan(v) else v for v in row] for row in shares.tolist()],
+            "materials": [m.name for m in sim.materials[: shares.shape[1]]],
+            "intensity_of_segregation": None if math.isnan(intensity) else intensity,
+        }
+    field = measures.solid_field(x, r, table.lower, table.upper, (1, 1, 1))
+    return {"solid_fraction": float(field[0, 0, 0])}

@@ -1,0 +1,315 @@
+"""Run of a case of particles: streams, sinks, moving walls, samples, checkpoints, in step order."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from greybed.core.errors import InputError
+from greybed.core.packing import Packing
+from greybed.dem.case import FileTable, PackTable, ParticleCase, StreamTable
+from greybed.dem.checkpoint import restore, save
+from greybed.dem.insertion import random_places
+from greybed.dem.measures import bed_height
+from greybed.dem.particles import rayleigh_time
+from greybed.dem.simulation import Simulation
+
+Array = NDArray[np.float64]
+
+# Steps between two looks at streams, sinks and servo walls, where the case does not say.
+LOOK = 200
+# Share of its velocity that a servo wall changes by at each look.
+_SERVO = 0.2
+
+
+@dataclass
+class Tally:
+    """What has come and gone, kept with each checkpoint.
+
+    Attributes
+    ----------
+    streamed : list of float
+        Mass that each table of particles has put in [kg].
+    inserted : list of int
+        Particles of each table.
+    batches : list of int
+        Batches of each table, for the random numbers of the next one.
+    sunk : list of float
+        Mass that each sink has taken [kg].
+    taken : list of int
+        Particles of each sink.
+    servo : list of float
+        Present share of its velocity of each wall with a servo.
+    history : list of dict
+        Samples.
+    """
+
+    streamed: list[float]
+    inserted: list[int]
+    batches: list[int]
+    sunk: list[float]
+    taken: list[int]
+    servo: list[float]
+    history: list[dict[str, float]] = field(default_factory=list)
+
+
+class ParticleRun:
+    """A case that runs, from its start or a checkpoint.
+
+    Parameters
+    ----------
+    case : ParticleCase
+        The case.
+    packings : mapping of table numbers to Packing
+        Contents of the files that ``[[particles]]`` of kind ``file`` name.
+    threads : int, optional
+        Threads; they change no bit.
+
+    Attributes
+    ----------
+    emptied : bool
+        Whether the sinks have taken the last particles, which ends the run.
+
+    Raises
+    ------
+    InputError
+        For what :class:`Simulation` refuses, or a pack that finds no room.
+    """
+
+    def __init__(
+        self, case: ParticleCase, packings: dict[int, Packing], *, threads: int | None = None
+    ) -> None:
+        self.case = case
+        tables, walls = case.particles, case.wall
+        self.tally = Tally(
+            [0.0] * len(tables), [0] * len(tables), [0] * len(tables),
+            [0.0] * len(case.sink), [0] * len(case.sink), [1.0] * len(walls),
+        )  # fmt: skip
+        # Materials of particles first: they may be those of walls, too.
+        used = {table.material for table in tables}
+        ordered = sorted(case.material, key=lambda m: m.name not in used)
+        self._materials = [m.material for m in ordered]
+        self._names = [m.name for m in ordered]
+        step = case.time_step
+        if step is None and case.law.normal == "hertz":
+            step = 0.1 * self._shortest(packings)
+        x, r, kind, v = self._start(packings)
+        periodic = case.periodic
+        self.simulation = Simulation(
+            x, r, self._materials, case.contacts(used), kinds=kind, kinds_to_come=len(used),
+            law=case.contact_law, walls=case.walls, gravity=case.gravity, time_step=step,
+            velocities=v, most_overlap=case.most_overlap, threads=threads,
+            box=None if periodic is None else [periodic.lower, periodic.upper],
+            periodic=(False,) * 3 if periodic is None
+            else ("x" in periodic.axes, "y" in periodic.axes, "z" in periodic.axes),
+        )  # fmt: skip
+        dt = self.simulation.time_step
+        self.steps = max(1, round(case.duration / dt))
+        self.look = LOOK if case.look is None else max(1, round(case.look / dt))
+        self._sample = max(1, round(case.output.samples / dt))
+        self.emptied = False
+        if not self.tally.history:
+            self._note()
+
+    # -- start ------------------------------------------------------------------------------
+
+    def _shortest(self, packings: dict[int, Packing]) -> float:
+        """Rayleigh's time of the particle with the shortest one, of all that may come [s]."""
+        times = []
+        for number, table in enumerate(self.case.particles):
+            kind = self._names.index(table.material)
+            if isinstance(table, FileTable):
+                least = float(packings[number].radii.min())
+            else:
+                least = self.case.smallest_radius(table.material)
+            place = np.array([[0.0, 0.0, 0.0, least]])
+            times.append(rayleigh_time(place, np.array([kind]), self._materials))
+        return min(times)
+
+    def _start(self, packings: dict[int, Packing]) -> tuple[Array, Array, Any, Array]:
+        """Particles that are there at time 0."""
+        places: list[Array] = []
+        sizes: list[Array] = []
+        kinds: list[Any] = []
+        speeds: list[Array] = []
+        for number, table in enumerate(self.case.particles):
+            if isinstance(table, FileTable):
+                x, r = packings[number].centres, packings[number].radii
+            elif getattr(table, "at", getattr(table, "starts", 0.0)) == 0.0:
+                taken = (np.concatenate(places), np.concatenate(sizes)) if places else ((), ())
+                x, r = self._drawn(number, table, *taken)
+            else:
+                continue
+            places.append(x)
+            sizes.append(r)
+            kinds.append(np.full(len(x), self._names.index(table.material)))
+            speeds.append(np.broadcast_to(np.array(table.velocity), x.shape))
+        return (
+            np.concatenate(places), np.concatenate(sizes), np.concatenate(kinds),
+            np.concatenate(speeds),
+        )  # fmt: skip
+
+    def _drawn(
+        self, number: int, table: PackTable | StreamTable, taken: Any, taken_radii: Any
+    ) -> tuple[Array, Array]:
+        """New spheres of a table that find room now."""
+        tally, case = self.tally, self.case
+        seed = [case.seed, number, tally.batches[number]]
+        tally.batches[number] += 1
+        density = self._materials[self._names.index(table.material)].density
+        if isinstance(table, PackTable):
+            # Large ones first: small ones find room between them.
+            r = table.distribution.radii(table.count)[::-1]
+        else:
+            due = self._due(table) - tally.streamed[number]
+            if due <= 0.0 and tally.batches[number] > 1:
+                return np.empty((0, 3)), np.empty(0)
+            mean = float((table.distribution.radii(1000) ** 3).mean())
+            most = 1 + math.ceil(max(due, 0.0) / (density * 4.0 / 3.0 * math.pi * mean))
+            r = table.distribution.sampled(most, np.random.default_rng([*seed, 1]))
+            mass = np.cumsum(density * 4.0 / 3.0 * math.pi * r**3)
+            r = r[: max(1, int(np.searchsorted(mass, due)))]
+        x = random_places(table.region, r, seed, taken=taken, taken_radii=taken_radii)
+        if isinstance(table, PackTable) and len(x) < len(r):
+            raise InputError(
+                f"particles[{number}]: only {len(x)} of {len(r)} particles find room between "
+                f"{table.lower} and {table.upper} [m]; make the region larger, or insert fewer."
+            )
+        r = r[: len(x)]
+        tally.inserted[number] += len(x)
+        tally.streamed[number] += float((density * 4.0 / 3.0 * math.pi * r**3).sum())
+        return x, r
+
+    def _due(self, table: StreamTable) -> float:
+        """Mass that a stream owes by now [kg]."""
+        time = self.simulation.time if hasattr(self, "simulation") else 0.0
+        return min(table.rate * max(time - table.starts, 0.0), table.mass)
+
+    # -- time -------------------------------------------------------------------------------
+
+    def go_on(self, until: int | None = None) -> Iterator[int]:
+        """Run to the end, or to a step; yields after each stretch the steps done in it."""
+        sim = self.simulation
+        end = self.steps if until is None else min(until, self.steps)
+        while sim.steps < end:
+            before = sim.steps
+            self._events(before)
+            if self.emptied:
+                self._note()
+                return
+            stop = min(end, (before // self.look + 1) * self.look)
+            stop = min(stop, (before // self._sample + 1) * self._sample)
+            sim.run(stop - before)
+            if sim.steps % self._sample == 0 or sim.steps == self.steps:
+                self._note()
+            yield sim.steps - before
+
+    def _events(self, step: int) -> None:
+        """What begins, comes or goes at this step."""
+        sim, case, dt = self.simulation, self.case, self.simulation.time_step
+
+        def now(time: float) -> bool:
+            # The first look at or after the time.
+            return 0 <= step - math.ceil(time / dt - 1e-9) < self.look and step % self.look == 0
+
+        for k, wall in enumerate(case.wall):
+            if now(wall.removed):
+                sim.drop_wall(wall.name)
+            if step > 0 and now(wall.starts):
+                sim.move_wall(wall.name, wall.velocity, wall.spin)
+            if now(wall.stops):
+                sim.move_wall(wall.name)
+            elif wall.servo is not None and wall.starts <= sim.time < wall.stops:
+                self._servo(k)
+        if step % self.look:
+            return
+        self._sink()
+        if step == 0:
+            return
+        for number, table in enumerate(case.particles):
+            owes = isinstance(table, StreamTable) and (
+                self._due(table) > self.tally.streamed[number] and sim.time >= table.starts
+            )
+            if owes or (isinstance(table, PackTable) and table.at > 0.0 and now(table.at)):
+                assert not isinstance(table, FileTable)
+                x, r = self._drawn(number, table, sim.centres, sim.radii)
+                if len(x):
+                    sim.insert(
+                        x, r, kinds=np.full(len(x), self._names.index(table.material)),
+                        velocities=np.broadcast_to(np.array(table.velocity), x.shape),
+                    )  # fmt: skip
+
+    def _servo(self, k: int) -> None:
+        """Turn a wall's speed towards where its force is the wanted one."""
+        wall, tally = self.case.wall[k], self.tally
+        assert wall.servo is not None
+        speed = np.linalg.norm(wall.velocity)
+        if speed == 0.0:
+            return
+        along = np.array(wall.velocity) / speed
+        # What the particles push back with, over what is wanted.
+        push = -float(self.simulation.wall_forces[k] @ along) / wall.servo
+        wanted = float(np.clip(1.0 - push, -1.0, 1.0))
+        tally.servo[k] += _SERVO * (wanted - tally.servo[k])
+        share = tally.servo[k]
+        self.simulation.move_wall(wall.name, tuple(share * v for v in wall.velocity))
+
+    def _sink(self) -> None:
+        sim = self.simulation
+        for k, sink in enumerate(self.case.sink):
+            x = sim.centres
+            inside = ((x > np.array(sink.lower)) & (x < np.array(sink.upper))).all(axis=1)
+            if not inside.any():
+                continue
+            self.tally.sunk[k] += float(sim.masses[inside].sum())
+            self.tally.taken[k] += int(inside.sum())
+            if inside.all():
+                # A simulation cannot be empty: the run is over, with these as they are.
+                self.emptied = True
+                return
+            sim.remove(inside)
+
+    def _note(self) -> None:
+        """A sample of the history."""
+        sim, e = self.simulation, self.simulation.energies
+        row = {
+            "time [s]": sim.time,
+            "particles [-]": float(len(sim.radii)),
+            "mass [kg]": float(sim.masses.sum()),
+            "kinetic energy [J]": e.kinetic,
+            "rotational energy [J]": e.rotational,
+            "potential energy [J]": e.potential,
+            "height [m]": bed_height(sim.centres, sim.radii),
+            "coordination [-]": sim.coordination,
+        }
+        for sink, mass, count in zip(
+            self.case.sink, self.tally.sunk, self.tally.taken, strict=True
+        ):
+            row[f"mass in {sink.name} [kg]"] = mass
+            row[f"particles in {sink.name} [-]"] = float(count)
+        for wall, force in zip(self.case.wall, sim.wall_forces, strict=True):
+            for axis, value in zip("xyz", force, strict=True):
+                row[f"force {axis} on {wall.name} [N]"] = float(value)
+        self.tally.history.append(row)
+
+    # -- files ------------------------------------------------------------------------------
+
+    def save(self, path: str | os.PathLike[str], **extra: Any) -> Path:
+        """Write a checkpoint, with the tallies and what else is given."""
+        return save(self.simulation, path, tally=vars(self.tally), **extra)
+
+    def restore(self, path: str | os.PathLike[str]) -> dict[str, Any]:
+        """Go back to a checkpoint; returns what else was given to :meth:`save`."""
+        extra = restore(self.simulation, path)
+        self.tally = Tally(**extra.pop("tally"))
+        return extra
+
+
+Progress = Callable[[int], object]

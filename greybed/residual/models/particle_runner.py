@@ -1,0 +1,138 @@
+"""Cases of particles as forward models: how they run, and which contact effects they switch."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from greybed.core.config import build
+from greybed.core.readers import read_packing
+from greybed.dem.case import FileTable, ParticleCase
+from greybed.dem.results import results_of
+from greybed.dem.runner import ParticleRun
+from greybed.residual.effect import Array, Columns, Effect
+from greybed.residual.models.runner import Runner, Switch
+
+
+class ParticleRunner(Runner):
+    """``kind = "particles"``: results as ``greybed simulate`` writes them."""
+
+    kind = "particles"
+    paths = ()
+    lacks = "the engine has spheres only"
+
+    def simulate(self, content: dict[str, Any]) -> dict[str, Any]:
+        """Run the particles from the start to the end."""
+        case = build(ParticleCase, content, self.path)
+        files = {k: t.file for k, t in enumerate(case.particles) if isinstance(t, FileTable)}
+        run = ParticleRun(case, {k: read_packing(path) for k, path in files.items()})
+        for _ in run.go_on():
+            pass
+        plain: dict[str, Any] = json.loads(json.dumps(results_of(run), default=float))
+        return plain
+
+    def reseed(self, content: dict[str, Any], seed: int) -> dict[str, Any]:
+        """Other places at the start."""
+        return {**content, "seed": seed}
+
+    def switches(self) -> dict[str, Switch]:
+        """Rolling resistance, cohesion between the particles, friction of the walls."""
+        return {
+            "rolling-resistance": Switch(ROLLING, _roll, _rolls),
+            "cohesion": Switch(COHESION, _stick, _sticks),
+            "wall-friction": Switch(WALLS, _rub, _rubs),
+        }
+
+
+def _inside(columns: Columns, amplitude: float) -> Array:
+    """The solver has these effects itself."""
+    raise AssertionError("effects of a case are switched in the case")
+
+
+ROLLING = Effect(
+    name="rolling-resistance",
+    law="elastic-plastic rolling spring that yields at A times normal force times radius",
+    source="Ai, Chen, Rotter & Ooi, Powder Technol. 206 (2011) 269",
+    group="rolling friction",
+    theory=None,
+    low=0.01,
+    high=1.0,
+    stage="outcome",
+    change=_inside,
+    switch='law.rolling = "epsd-modified", contact.rolling_friction = A',
+)
+COHESION = Effect(
+    name="cohesion",
+    law="attraction of A times the disc of a contact between particles",
+    source="energy density of contact area (SJKR)",
+    group="cohesion energy density over rho g d",
+    theory=None,
+    low=1.0,
+    high=1e6,
+    stage="outcome",
+    change=_inside,
+    switch='law.cohesion = "sjkr", contact.cohesion = A',
+)
+WALLS = Effect(
+    name="wall-friction",
+    law="friction A between particles and walls, where the base has none",
+    source="Coulomb",
+    group="wall friction",
+    theory=None,
+    low=0.02,
+    high=1.0,
+    stage="outcome",
+    change=_inside,
+    switch="contact.friction = A for contacts with walls",
+)
+
+
+def _own(content: Mapping[str, Any]) -> set[str]:
+    """Materials of the particles."""
+    return {str(table.get("material")) for table in content.get("particles", ())}
+
+
+def _contacts(content: Mapping[str, Any], walls: bool) -> list[dict[str, Any]]:
+    own = _own(content)
+    return [
+        table
+        for table in content.get("contact", ())
+        if (set(table.get("between", ())) <= own) != walls
+    ]
+
+
+def _roll(content: dict[str, Any], amplitude: float) -> None:
+    content.setdefault("law", {})["rolling"] = "epsd-modified"
+    for table in content.get("contact", ()):
+        table["rolling_friction"] = amplitude
+
+
+def _rolls(content: Mapping[str, Any]) -> str | None:
+    rolling = content.get("law", {}).get("rolling", "none")
+    return None if rolling == "none" else f"the case has it (law.rolling = {rolling!r})"
+
+
+def _stick(content: dict[str, Any], amplitude: float) -> None:
+    content.setdefault("law", {})["cohesion"] = "sjkr"
+    for table in _contacts(content, walls=False):
+        table["cohesion"] = amplitude
+
+
+def _sticks(content: Mapping[str, Any]) -> str | None:
+    cohesion = content.get("law", {}).get("cohesion", "none")
+    return None if cohesion == "none" else f"the case has it (law.cohesion = {cohesion!r})"
+
+
+def _rub(content: dict[str, Any], amplitude: float) -> None:
+    for table in _contacts(content, walls=True):
+        table["friction"] = amplitude
+
+
+def _rubs(content: Mapping[str, Any]) -> str | None:
+    walls = _contacts(content, walls=True)
+    if not walls:
+        return "walls have no material of their own, so no contact of theirs can change"
+    if any(table.get("friction", 0.0) != 0.0 for table in walls):
+        return "the case has it (contact.friction of the walls)"
+    return None
