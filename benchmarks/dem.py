@@ -43,8 +43,8 @@ GLASS = Material(2500.0, 5e6, 0.45, "glass")
 SKINS = (0.05, 0.1, 0.25, 0.5)  # of LIGGGHTS, in radii
 PLAIN = "hertz tangential history"
 RICH = f"{PLAIN} cohesion sjkr rolling_friction epsd"
-# Falling spheres are chaotic: a start off by 1e-13 m changes the energy by 0.2 %. LIGGGHTS also
-# keeps the springs of contacts that have parted, by default: up to 1 % more.
+# Falling spheres are chaotic: a start off by 1e-13 m changes the energy by 0.2 %, and another skin
+# of LIGGGHTS by up to 1 %.
 SAME_ENERGY, SAME_CONTACTS = 0.02, 0.01
 
 
