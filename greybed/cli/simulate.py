@@ -7,7 +7,7 @@ checkpoint when the same command is given again, and ends with the same bits.
 
 examples:
   greybed simulate examples/heated_bed/case.toml --out runs/heated_bed
-  greybed simulate examples/hopper/case.toml --out runs/hopper --movie
+  greybed simulate examples/particles/hopper.toml --out runs/hopper --movie
 """
 
 from __future__ import annotations

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from greybed.core.config import quantity, vector
-from greybed.core.walls import Cone, Cylinder, Disc, Plane, Wall
+from greybed.core.walls import Cone, Cylinder, Disc, Plane, Polygon, Wall
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,6 +67,22 @@ class DiscShape:
     def wall(self) -> Wall:
         """The wall itself."""
         return Disc(self.point, self.normal, self.radius, self.name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RectangleShape:
+    """``[[wall]]`` with ``kind = "rectangle"``, or a parallelogram; normal along a x b."""
+
+    name: str
+    corner: tuple[float, float, float] = vector("length")  # [m]
+    a: tuple[float, float, float] = vector("length")  # one side, from the corner [m]
+    b: tuple[float, float, float] = vector("length")  # the other one [m]
+
+    def wall(self) -> Wall:
+        """The wall itself."""
+        p, a, b = (np.array(v) for v in (self.corner, self.a, self.b))
+        x, y, z, w = (tuple(v.tolist()) for v in (p, p + a, p + a + b, p + b))
+        return Polygon((x, y, z, w), self.name)
 
 
 @dataclass(frozen=True, kw_only=True)

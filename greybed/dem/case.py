@@ -10,7 +10,14 @@ from pathlib import Path
 from greybed.core.config import choice, quantity, read_case, rows, tables, vector, whole, words
 from greybed.core.errors import InputError
 from greybed.core.sizes import Sizes, parse_sizes
-from greybed.core.wall_tables import ConeShape, CylinderShape, DiscShape, MeshShape, PlaneShape
+from greybed.core.wall_tables import (
+    ConeShape,
+    CylinderShape,
+    DiscShape,
+    MeshShape,
+    PlaneShape,
+    RectangleShape,
+)
 from greybed.dem.insertion import Region
 from greybed.dem.laws import COHESION, NORMAL, ROLLING, ContactLaw
 from greybed.dem.materials import Contact, Material
@@ -114,8 +121,24 @@ class DiscTable(DiscShape, _Solid):
 
 
 @dataclass(frozen=True, kw_only=True)
+class RectangleTable(RectangleShape, _Solid):
+    """``[[wall]]`` with ``kind = "rectangle"``."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class MeshTable(MeshShape, _Solid):
     """``[[wall]]`` with ``kind = "mesh"``."""
+
+
+WallTable = PlaneTable | CylinderTable | ConeTable | DiscTable | RectangleTable | MeshTable
+WALLS = {
+    "plane": PlaneTable,
+    "cylinder": CylinderTable,
+    "cone": ConeTable,
+    "disc": DiscTable,
+    "rectangle": RectangleTable,
+    "mesh": MeshTable,
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -194,6 +217,8 @@ class PileTable:
     width: float = quantity("length", above=0.0)  # of a bin [m]
     axis: str = choice(("heap", "x", "y"), "heap")
     above: float = quantity("length", -1e30)  # only spheres with centres above this height [m]
+    lower: float = quantity("length", -1e30)  # and between these two along the axis [m]
+    upper: float = quantity("length", 1e30)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -209,7 +234,7 @@ class CompartmentsTable:
 
 @dataclass(frozen=True, kw_only=True)
 class SolidTable:
-    """``[[measure]]`` with ``kind = "solid"``: solid fraction in a box at the end."""
+    """``[[measure]]`` with ``kind = "solid"``: solid fraction and mass in a box at the end."""
 
     name: str
     lower: tuple[float, float, float] = vector("length")  # [m]
@@ -258,17 +283,7 @@ class ParticleCase:
     law: LawTable = LawTable()
     material: tuple[MaterialTable, ...] = rows(MaterialTable)
     contact: tuple[ContactTable, ...] = rows(ContactTable)
-    wall: tuple[PlaneTable | CylinderTable | ConeTable | DiscTable | MeshTable, ...] = tables(
-        "kind",
-        {
-            "plane": PlaneTable,
-            "cylinder": CylinderTable,
-            "cone": ConeTable,
-            "disc": DiscTable,
-            "mesh": MeshTable,
-        },
-        (),
-    )
+    wall: tuple[WallTable, ...] = tables("kind", WALLS, ())
     particles: tuple[PackTable | StreamTable | FileTable, ...] = tables(
         "kind", {"pack": PackTable, "stream": StreamTable, "file": FileTable}
     )

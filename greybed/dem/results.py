@@ -61,9 +61,11 @@ def _measure(run: ParticleRun, table: Any) -> dict[str, Any]:
     x, r = sim.centres, sim.radii
     if isinstance(table, PileTable):
         chosen = x[:, 2] > table.above
-        if not chosen.any():
-            raise InputError(f"measure {table.name!r}: no particle is above {table.above:g} [m].")
         axis = {"heap": None, "x": 0, "y": 1}[table.axis]
+        if axis is not None:
+            chosen &= (x[:, axis] > table.lower) & (x[:, axis] < table.upper)
+        if not chosen.any():
+            return {"angle_deg": None, "why": "no particle is there"}
         profile = measures.pile_profile(x[chosen], r[chosen], table.width, axis=axis)
         known = np.isfinite(profile.height)
         found: dict[str, Any] = {
@@ -87,4 +89,9 @@ def _measure(run: ParticleRun, table: Any) -> dict[str, Any]:
             "intensity_of_segregation": None if math.isnan(intensity) else intensity,
         }
     field = measures.solid_field(x, r, table.lower, table.upper, (1, 1, 1))
-    return {"solid_fraction": float(field[0, 0, 0])}
+    inside = ((x > np.array(table.lower)) & (x < np.array(table.upper))).all(axis=1)
+    return {
+        "solid_fraction": float(field[0, 0, 0]),
+        "mass_kg": float(sim.masses[inside].sum()),
+        "particles": int(inside.sum()),
+    }

@@ -135,11 +135,10 @@ class Simulation(Population):
             (0.25 * float(place[:, 3].mean()) if skin is None else float(skin)) + reach,
             reach,
         )
-        self.threads = available_threads() if threads is None else int(threads)
-        if not 1 <= self.threads <= numba.config.NUMBA_NUM_THREADS:
-            raise InputError(
-                f"threads = {self.threads} must lie in 1 ... {numba.config.NUMBA_NUM_THREADS}."
-            )
+        most = int(numba.config.NUMBA_NUM_THREADS)
+        self.threads = min(available_threads(), most) if threads is None else int(threads)
+        if not 1 <= self.threads <= most:
+            raise InputError(f"threads = {self.threads} must lie in 1 ... {most}.")
         self.steps = 0
         self.labels = np.arange(n)
         self._next = n
