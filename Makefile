@@ -31,6 +31,7 @@ lint: $(STAMP)   ## mend what can be mended, show the rest
 
 bench: $(STAMP)  ## benchmarks against peers; not part of the tests
 	$(BIN)/python benchmarks/raytrace.py
+	$(BIN)/python benchmarks/dem.py
 
 hooks: $(STAMP)  ## install the pre-commit hooks
 	$(BIN)/pre-commit install
