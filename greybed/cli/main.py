@@ -5,9 +5,11 @@ from __future__ import annotations
 import _thread
 import argparse
 import os
+import signal
 import sys
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Any, NoReturn
 
@@ -65,10 +67,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f"unknown verb {verb!r}; one of: {', '.join(VERBS)}")
     before = sys.unraisablehook
     sys.unraisablehook = _keep_interrupt(before)
+    known: tuple[type[Exception], ...] = ()
     try:
-        from greybed.core.errors import GreybedError  # here, for numpy takes a while to load
+        with _interrupt_later():
+            # Here, for numpy takes a while to load.
+            from greybed.core.errors import GreybedError
 
-        module = import_module(f"greybed.cli.{VERBS[verb][0]}")
+            known = (GreybedError,)
+            module = import_module(f"greybed.cli.{VERBS[verb][0]}")
         verb_parser = _Parser(
             prog=f"greybed {verb}",
             description=module.__doc__,
@@ -81,7 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"greybed {verb}: interrupted; what was finished is kept.", file=sys.stderr)
         return 130
-    except GreybedError as error:
+    except known as error:
         print(f"greybed {verb}: {error}", file=sys.stderr)
         return 2
     except BrokenPipeError:  # as in ``greybed info bed.dump | head -1``
@@ -105,6 +111,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     finally:
         sys.unraisablehook = before
+
+
+@contextmanager
+def _interrupt_later() -> Iterator[None]:
+    """Hold a Ctrl-C back until libraries are loaded: numpy makes an ImportError of it."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.getsignal(signal.SIGINT)
+    if before in (signal.SIG_IGN, None):
+        yield
+        return
+    came: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if came:
+        raise KeyboardInterrupt
 
 
 def _forget_stdout() -> None:

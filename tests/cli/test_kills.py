@@ -217,6 +217,29 @@ def test_ctrl_c_is_one_sentence(here, verb):
         assert re.fullmatch(r"greybed \w+: interrupted; what was finished is kept\.", lines[0])
 
 
+@posix
+def test_ctrl_c_while_libraries_load_waits_for_them():
+    from greybed.cli import main as main_function
+
+    module = sys.modules[main_function.__module__]
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    loaded = []
+
+    def load():
+        with module._interrupt_later():
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.05)
+            loaded.append(True)
+
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            load()
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert loaded
+
+
 # Without any cache Numba compiles; its callbacks swallow the first Ctrl-C.
 @posix
 def test_ctrl_c_while_numba_compiles(here, tmp_path):
