@@ -21,7 +21,8 @@ def run_particles(options: argparse.Namespace) -> int:
     from greybed.core.progress import progress
     from greybed.core.readers import read_packing
     from greybed.core.writers import write_packing
-    from greybed.dem.case import FileTable, MeshTable, load_particle_case
+    from greybed.dem.case import load_particle_case
+    from greybed.dem.case_tables import FileTable, MeshTable
     from greybed.dem.checkpoint import kept_with
     from greybed.dem.results import results_of
     from greybed.dem.runner import ParticleRun
@@ -174,7 +175,7 @@ class _Frames:
         """The same box for all frames: what particles have filled, or will be put into."""
         import numpy as np
 
-        from greybed.dem.case import FileTable
+        from greybed.dem.case_tables import FileTable
 
         if self.stage is None:
             sim, case = self.run.simulation, self.run.case

@@ -9,7 +9,7 @@ import numpy as np
 
 from greybed.core.errors import InputError
 from greybed.dem import measures
-from greybed.dem.case import CompartmentsTable, PileTable
+from greybed.dem.case_tables import CompartmentsTable, PileTable
 from greybed.dem.runner import ParticleRun
 
 

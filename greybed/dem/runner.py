@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from greybed.core.errors import InputError
 from greybed.core.packing import Packing
-from greybed.dem.case import FileTable, PackTable, ParticleCase, StreamTable
+from greybed.dem.case import ParticleCase
+from greybed.dem.case_tables import FileTable, PackTable, StreamTable
 from greybed.dem.checkpoint import restore, save
 from greybed.dem.insertion import random_places
 from greybed.dem.measures import bed_height

@@ -8,7 +8,8 @@ from typing import Any
 
 from greybed.core.config import build
 from greybed.core.readers import read_packing
-from greybed.dem.case import FileTable, ParticleCase
+from greybed.dem.case import ParticleCase
+from greybed.dem.case_tables import FileTable
 from greybed.dem.results import results_of
 from greybed.dem.runner import ParticleRun
 from greybed.residual.effect import Array, Columns, Effect
