@@ -65,10 +65,11 @@ def wrap(place, low, edge, periodic):
 
 @njit(**_OPTIONS)
 def list_pairs(
-    place, cell, start, member, shape, periodic, edge, skin, first, partner, shift
+    place, body, cell, start, member, shape, periodic, edge, skin, first, partner, shift
 ):  # fmt: skip
     """Pairs whose surfaces are nearer than ``skin``, each once, by the lower particle.
 
+    Spheres of one body, those with the same number of at least 0, are no pair.
     Fills ``first`` (n + 1), ``partner`` and the image codes ``shift`` (13 is none). Returns their
     number, or minus the number needed where the arrays are too short.
     """
@@ -112,6 +113,8 @@ def list_pairs(
                         dz = place[j, 2] + mz * edge[2] - z
                         reach = r + place[j, 3] + skin
                         if dx * dx + dy * dy + dz * dz < reach * reach:
+                            if body[i] >= 0 and body[j] == body[i]:
+                                continue
                             if count < partner.size:
                                 partner[count] = j
                                 shift[count] = (mx + 1) * 9 + (my + 1) * 3 + mz + 1

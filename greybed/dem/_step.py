@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit, prange
 
 from greybed.dem._pairs import block_forces
+from greybed.dem._rigid import kick_bodies
 from greybed.dem._walls import move, wall_forces
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
@@ -23,6 +24,7 @@ class State(NamedTuple):
     kind: np.ndarray  # (n,) int64, material
     listed: np.ndarray  # (n, 3): centre when the lists were made [m]
     fixed: np.ndarray  # (n,) bool: moves on as it does, whatever the force
+    body: np.ndarray  # (n,) int64: rigid body that it belongs to, or -1
 
 
 class Near(NamedTuple):
@@ -75,6 +77,7 @@ def _kick_and_drift(begin, end, state, near, push, dt, finish, start, worst):
     # Flat: numba multiplies by strides at each access of two indices.
     place, motion = state.place.reshape(-1), state.motion.reshape(-1)
     load, listed, fixed = state.load.reshape(-1), state.listed.reshape(-1), state.fixed
+    body = state.body
     into, slots, crossing = near.into, near.slots, near.crossing
     halves = finish + start
     half = 0.5 * dt
@@ -87,7 +90,7 @@ def _kick_and_drift(begin, end, state, near, push, dt, finish, start, worst):
                 for c in range(6):
                     load[8 * i + c] += crossing[slots[k], c]
         vx, vy, vz = motion[m], motion[m + np.uint64(1)], motion[m + np.uint64(2)]
-        if not fixed[i]:
+        if body[i] < 0 and not fixed[i]:
             kick, spin = half / motion[m + np.uint64(6)], half / motion[m + np.uint64(7)]
             ax = kick * load[m] + gx
             ay = kick * load[m + np.uint64(1)] + gy
@@ -109,12 +112,10 @@ def _kick_and_drift(begin, end, state, near, push, dt, finish, start, worst):
             motion[m + np.uint64(4)] = wy
             motion[m + np.uint64(5)] = wz
         if start:
-            x, y, z = (
-                place[p] + dt * vx,
-                place[p + np.uint64(1)] + dt * vy,
-                place[p + np.uint64(2)] + dt * vz,
-            )
-            place[p], place[p + np.uint64(1)], place[p + np.uint64(2)] = x, y, z
+            x, y, z = place[p], place[p + np.uint64(1)], place[p + np.uint64(2)]
+            if body[i] < 0:  # others have been moved with their body
+                x, y, z = x + dt * vx, y + dt * vy, z + dt * vz
+                place[p], place[p + np.uint64(1)], place[p + np.uint64(2)] = x, y, z
             dx = x - listed[3 * i]
             dy = y - listed[3 * i + 1]
             dz = z - listed[3 * i + 2]
@@ -136,7 +137,9 @@ def _kicks_of_blocks(state, near, push, dt, finish, start, worst):
 
 
 @njit(**_OPTIONS)
-def _kicks(state, near, push, dt, finish, start, worst):
+def _kicks(state, near, rigid, push, edge, dt, finish, start, worst):
+    if rigid.first.size > 1:
+        kick_bodies(rigid, state, near, push, edge, dt, finish, start)
     # To wake threads for a single block takes longer than its step.
     if near.block.size == 2:
         _kick_and_drift(
@@ -184,7 +187,7 @@ def forces(state, near, surfaces, law, edge, periodic, dt, count):
 
 @njit(**_OPTIONS)
 def advance(
-    steps, state, near, surfaces, law, edge, periodic, push, dt, skin, wall_pace, wall_way,
+    steps, state, near, rigid, surfaces, law, edge, periodic, push, dt, skin, wall_pace, wall_way,
     pending, worst, count,
 ):  # fmt: skip
     """Up to ``steps`` steps; returns those done, why it ended, and the particle that was at fault.
@@ -194,7 +197,7 @@ def advance(
     """
     blocks = near.block.size - 1
     for step in range(steps):
-        _kicks(state, near, push, dt, np.int64(pending), np.int64(1), worst)
+        _kicks(state, near, rigid, push, edge, dt, np.int64(pending), np.int64(1), worst)
         pending = True
         largest, who = 0.0, -1
         for b in range(blocks):
@@ -224,7 +227,7 @@ def gather(state, near):
 
 
 @njit(**_OPTIONS)
-def finish(state, near, push, dt, worst):
+def finish(state, near, rigid, push, edge, dt, worst):
     """The second half of the last step's kick."""
-    _kicks(state, near, push, dt, np.int64(1), np.int64(0), worst)
+    _kicks(state, near, rigid, push, edge, dt, np.int64(1), np.int64(0), worst)
     near.crossing[:, :] = 0.0

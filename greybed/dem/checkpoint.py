@@ -13,10 +13,11 @@ import numpy as np
 from greybed.core.errors import InputError
 from greybed.core.files import atomic_path
 from greybed.dem import _step
+from greybed.dem._rigid import Rigid
 from greybed.dem.lists import Lists
 from greybed.dem.simulation import Simulation
 
-FORMAT = "greybed-particles-1"
+FORMAT = "greybed-particles-2"
 
 
 def save(simulation: Simulation, path: str | os.PathLike[str], **extra: Any) -> Path:
@@ -40,7 +41,8 @@ def save(simulation: Simulation, path: str | os.PathLike[str], **extra: Any) -> 
     arrays: dict[str, Any] = {
         f"{part}_{name}": value
         for part, group in (
-            ("state", lists.state), ("near", lists.near), ("surfaces", lists.surfaces)
+            ("state", lists.state), ("near", lists.near), ("surfaces", lists.surfaces),
+            ("rigid", lists.rigid),
         )
         for name, value in group._asdict().items()
     }  # fmt: skip
@@ -89,7 +91,8 @@ def restore(simulation: Simulation, path: str | os.PathLike[str]) -> dict[str, A
         groups: dict[str, Any] = {
             part: kind(**{name: arrays[f"{part}_{name}"] for name in kind._fields})
             for part, kind in (
-                ("state", _step.State), ("near", _step.Near), ("surfaces", _step.Surfaces)
+                ("state", _step.State), ("near", _step.Near), ("surfaces", _step.Surfaces),
+                ("rigid", Rigid),
             )
         }  # fmt: skip
     except OSError as error:
@@ -106,6 +109,7 @@ def restore(simulation: Simulation, path: str | os.PathLike[str]) -> dict[str, A
         )
     lists: Lists = simulation._lists
     lists.state, lists.near, lists.surfaces = groups["state"], groups["near"], groups["surfaces"]
+    lists.rigid = groups["rigid"]
     lists.ident, lists.worst, lists.count = arrays["ident"], arrays["worst"], arrays["count"]
     lists.wall_way, lists.skin = float(numbers["wall_way"]), float(numbers["skin"])
     lists.wall_pace = lists.pace()

@@ -45,7 +45,7 @@ class Heat:
     Raises
     ------
     InputError
-        For numbers out of range, or a wall that is not there.
+        For numbers out of range, a wall that is not there, or clumps.
     """
 
     def __init__(
@@ -59,6 +59,8 @@ class Heat:
         arriving: float | None = None,
         stiffness_ratio: float = 1.0,
     ) -> None:
+        if len(simulation.bodies.masses):
+            raise InputError("heat: clumps have no temperature; take spheres.")
         self.simulation = simulation
         n, kinds = len(simulation.labels), len(simulation.materials)
         self._conductivity = _checked(conductivity, kinds, "conductivity", "W/m/K")

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from greybed.core.errors import InputError
-from greybed.dem import _neighbours, _step, _walls
+from greybed.dem import _neighbours, _rigid, _step, _walls
+from greybed.dem.bodies import chosen_bodies, joined_bodies, joined_states
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -30,6 +31,8 @@ class Lists:
         Numbers of the input in this order.
     near, surfaces
         Lists for the compiled steps.
+    rigid : Rigid
+        Bodies; their spheres are numbered as in ``state``.
     skin, reach : float
         Gap up to which pairs are listed, and up to which they attract each other [m].
     wall_pace, wall_way : float
@@ -39,6 +42,7 @@ class Lists:
     def __init__(
         self,
         state: _step.State,
+        rigid: _rigid.Rigid,
         walls: tuple[Index, Array, Index, Array],
         wall_kind: Index,
         columns: int,
@@ -48,7 +52,7 @@ class Lists:
         reach: float,
     ) -> None:
         n = len(state.place)
-        self.state = state
+        self.state, self.rigid = state, rigid
         self.ident = np.arange(n)
         self.skin, self.reach, self.columns = skin, reach, columns
         self.periodic = np.array(periodic, dtype=bool)
@@ -85,13 +89,12 @@ class Lists:
         self.worst = np.zeros((blocks, 2))
         self.count = np.zeros((blocks, 3))
 
-    def extend(self, more: _step.State) -> None:
+    def extend(self, more: _step.State, bodies: _rigid.Rigid) -> None:
         """Take in particles that touch nothing, numbered after those that are there."""
         m = len(more.place)
         self.ident = np.concatenate([self.ident, np.arange(m) + len(self.ident)])
-        self.state = _step.State(
-            *(np.concatenate([a, b]) for a, b in zip(self.state, more, strict=True))
-        )
+        self.state = joined_states([self.state, more])
+        self.rigid = joined_bodies([self.rigid, bodies])
         near, surfaces = self.near, self.surfaces
         self.near = near._replace(
             first=np.concatenate([near.first, np.full(m, near.first[-1])]),
@@ -181,11 +184,29 @@ class Lists:
             near = self.near
         self.state = _step.State(
             place, old.motion[order], old.load[order], old.kind[order], place[:, :3].copy(),
-            old.fixed[order],
+            old.fixed[order], old.body[order],
         )  # fmt: skip
+        if len(self.rigid.pose):
+            self._renew_bodies(order, len(old.place))
         self._renew_pairs(near, order, cell, shape)
         self._renew_surfaces(order)
         self.wall_way = 0.0
+
+    def _renew_bodies(self, order: Index, before: int) -> None:
+        """Spheres of the bodies where they are now; bodies without spheres are gone."""
+        now = np.full(before, -1)
+        now[order] = np.arange(len(order))
+        rigid = self.rigid._replace(member=now[self.rigid.member])
+        stays = rigid.member[rigid.first[:-1]] >= 0
+        if not stays.all():
+            rigid = chosen_bodies(rigid, stays)
+            number = np.cumsum(stays) - 1
+            body = self.state.body
+            self.state = self.state._replace(body=np.where(body >= 0, number[body], -1))
+        if self.wraps and len(rigid.pose):
+            _neighbours.wrap(rigid.pose, self.box[0], self.edge, self.periodic)
+            _rigid.images_of(rigid, self.state.place, self.edge)
+        self.rigid = rigid
 
     def _grid(self, place: Array) -> tuple[Array, Array, Index]:
         low = np.where(self.periodic, self.box[0], place[:, :3].min(axis=0))
@@ -209,8 +230,8 @@ class Lists:
         while True:
             partner, shift = np.empty(room, np.int32), np.empty(room, np.uint8)
             found = _neighbours.list_pairs(
-                place, cell, start, member, shape, self.periodic, self.edge, self.skin, first,
-                partner, shift,
+                place, self.state.body, cell, start, member, shape, self.periodic, self.edge,
+                self.skin, first, partner, shift,
             )  # fmt: skip
             if found >= 0:
                 break
@@ -273,7 +294,7 @@ class Lists:
     @property
     def bytes(self) -> int:
         """Memory of state and lists [B]."""
-        parts = (*self.state, *self.near, *self.surfaces, self.ident)
+        parts = (*self.state, *self.near, *self.surfaces, *self.rigid, self.ident)
         return sum(part.nbytes for part in parts)
 
 

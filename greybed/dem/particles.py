@@ -18,7 +18,7 @@ Index = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Energies:
-    """Energies of all free particles [J]: of motion, of spin, and of height (0 at the origin)."""
+    """Energies of all particles [J]: of motion, of spin, and of height (0 at the origin)."""
 
     kinetic: float
     rotational: float
@@ -37,6 +37,7 @@ def particle_arrays(
     kinds: ArrayLike | None,
     velocities: ArrayLike | None,
     spins: ArrayLike | None,
+    least: int = 1,
 ) -> tuple[Array, Array, Index, list[Material]]:
     """Checked arrays of the particles."""
     known = [materials] if isinstance(materials, Material) else list(materials)
@@ -44,8 +45,9 @@ def particle_arrays(
     if not known or len(set(names)) < len(names):
         raise InputError(f"materials {names} must have different names, and be one at least.")
     at = np.array(centres, dtype=np.float64)
-    if at.ndim != 2 or at.shape[1] != 3 or not len(at):
-        raise InputError(f"centres of shape {at.shape} must be (n, 3), n at least 1.")
+    at = at.reshape(0, 3) if at.size == 0 and least == 0 else at
+    if at.ndim != 2 or at.shape[1] != 3 or len(at) < least:
+        raise InputError(f"centres of shape {at.shape} must be (n, 3), n at least {least}.")
     n = len(at)
     place = np.empty((n, 4))
     place[:, :3] = at
@@ -58,7 +60,7 @@ def particle_arrays(
             "finite, the radius above 0."
         )
     kind = np.zeros(n, np.int64) if kinds is None else np.array(kinds, dtype=np.int64)
-    if kind.shape != (n,) or kind.min() < 0 or kind.max() >= len(known):
+    if kind.shape != (n,) or not ((kind >= 0) & (kind < len(known))).all():
         raise InputError(
             f"kinds must be {n} numbers in 0 ... {len(known) - 1}, one for each particle."
         )

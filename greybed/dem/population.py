@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from greybed.core.errors import InputError
 from greybed.dem import _step
+from greybed.dem._rigid import Rigid
+from greybed.dem.bodies import Clumps, bodies_of, no_bodies
 from greybed.dem.laws import ContactLaw
 from greybed.dem.materials import Material
 from greybed.dem.particles import particle_arrays, rayleigh_time
@@ -57,6 +59,33 @@ class Population(Views):
         place, motion, kind, _ = particle_arrays(
             centres, radii, self.materials, kinds, velocities, spins
         )
+        m = len(place)
+        self._take_in(
+            _step.State(
+                place, motion, np.zeros((m, 8)), kind, place[:, :3].copy(), np.zeros(m, bool),
+                np.full(m, -1),
+            ),
+            no_bodies(),
+        )  # fmt: skip
+
+    def insert_clumps(self, clumps: Clumps) -> None:
+        """Add clumps that touch nothing; their spheres are numbered after the others.
+
+        Raises
+        ------
+        InputError
+            As :meth:`insert`.
+        """
+        self._take_in(
+            *bodies_of(
+                [clumps], self.materials, len(self._state.place), len(self._lists.rigid.pose)
+            )
+        )
+
+    def _take_in(self, more: _step.State, bodies: Rigid) -> None:
+        place, kind = more.place, more.kind
+        if not len(place):
+            return
         if kind.max() >= self._kinds:
             raise InputError(
                 f"kinds = {int(kind.max())}: particles of {self.materials[kind.max()].name!r} come "
@@ -69,11 +98,7 @@ class Population(Views):
                 f"time {shortest:.3g} [s] of the particles to be inserted; take a smaller one."
             )
         n, m = len(self._state.place), len(place)
-        self._lists.extend(
-            _step.State(
-                place, motion, np.zeros((m, 8)), kind, place[:, :3].copy(), np.zeros(m, bool)
-            )
-        )
+        self._lists.extend(more, bodies)
         self._state = self._lists.state
         self.labels = np.concatenate([self.labels, self._next + np.arange(m)])
         self._next += m
@@ -94,12 +119,13 @@ class Population(Views):
         Parameters
         ----------
         which : array_like of bool, shape (n,)
-            Those that go, in the order of ``centres``; one must stay.
+            Those that go, in the order of ``centres``; one must stay. The spheres of a body stay
+            or go together.
 
         Raises
         ------
         InputError
-            For another shape, or if none would stay.
+            For another shape, if none would stay, or if a body would lose a part.
         """
         gone = np.asarray(which, dtype=bool)
         if gone.shape != (len(self._state.place),) or gone.all():
@@ -107,6 +133,16 @@ class Population(Views):
                 f"which = {gone.sum()} of {gone.size} particles must be a choice from "
                 f"{len(self._state.place)}, and one must stay."
             )
+        rigid = self._lists.rigid
+        lost = gone[self._lists.ident[rigid.member]]
+        if len(lost):
+            share = np.add.reduceat(lost, rigid.first[:-1], dtype=np.int64)
+            torn = (share > 0) & (share < np.diff(rigid.first))
+            if torn.any():
+                raise InputError(
+                    f"which takes {int(share[torn][0])} of {int(np.diff(rigid.first)[torn][0])} "
+                    "spheres of a body away; the spheres of a body stay or go together."
+                )
         if gone.any():
             self._lists.renew(~gone[self._lists.ident])
             self._state = self._lists.state

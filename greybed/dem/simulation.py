@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from greybed.core.errors import InputError
 from greybed.core.processors import available_threads
 from greybed.dem import _cohesion, _columns, _step
+from greybed.dem.bodies import Clumps, bodies_of, joined_states
 from greybed.dem.laws import COHESION, NORMAL, ROLLING, ContactLaw
 from greybed.dem.lists import Lists
 from greybed.dem.materials import Contact, Material, pair_tables
@@ -56,6 +57,8 @@ class Simulation(Population):
         At most 40 % of Rayleigh's time, a tenth of it by default; linear laws must state one [s].
     velocities, spins : array_like, shape (n, 3), optional
         At the start, 0 by default [m/s], [1/s].
+    clumps : sequence of Clumps
+        Rigid bodies. Their spheres are numbered after the others, of which there may be none then.
     skin : float, optional
         Pairs nearer than it are listed [m]; a quarter of the mean radius by default.
     most_overlap : float
@@ -92,14 +95,24 @@ class Simulation(Population):
         time_step: float | None = None,
         velocities: ArrayLike | None = None,
         spins: ArrayLike | None = None,
+        clumps: Sequence[Clumps] = (),
         skin: float | None = None,
         most_overlap: float = 0.3,
         threads: int | None = None,
     ) -> None:
         place, motion, kind, known = particle_arrays(
-            centres, radii, materials, kinds, velocities, spins
+            centres, radii, materials, kinds, velocities, spins, least=0 if clumps else 1
         )
         n = len(place)
+        more, rigid = bodies_of(clumps, known, n, 0)
+        state = joined_states([
+            _step.State(
+                place, motion, np.zeros((n, 8)), kind, place[:, :3].copy(), np.zeros(n, bool),
+                np.full(n, -1),
+            ),
+            more,
+        ])  # fmt: skip
+        place, kind, n = state.place, state.kind, len(state.place)
         self.law = law or ContactLaw()
         self.most_overlap = most_overlap
         self.walls = tuple(walls)
@@ -121,12 +134,11 @@ class Simulation(Population):
         self.gravity = np.array(gravity, dtype=np.float64)
         if self.gravity.shape != (3,) or not np.isfinite(self.gravity).all():
             raise InputError(f"gravity = {gravity} must be three finite numbers [m/s2].")
-        self._state = _step.State(
-            place, motion, np.zeros((n, 8)), kind, place[:, :3].copy(), np.zeros(n, bool)
-        )
+        self._state = state
         reach = self._reach(float(place[:, 3].max()))
         self._lists = Lists(
             self._state,
+            rigid,
             surfaces_of(walls),
             np.array(of_walls, np.int64),
             self.law.columns,
@@ -176,7 +188,7 @@ class Simulation(Population):
         lists = self._lists
         while left:
             done, why, who, lists.wall_way = _step.advance(
-                left, self._state, lists.near, lists.surfaces, self._law, lists.edge,
+                left, self._state, lists.near, lists.rigid, lists.surfaces, self._law, lists.edge,
                 lists.wraps, self.gravity, self.time_step, lists.skin - lists.reach,
                 lists.wall_pace, lists.wall_way, self._pending, lists.worst, lists.count,
             )  # fmt: skip
@@ -195,7 +207,10 @@ class Simulation(Population):
                 self._pending = True
                 self._check_overlaps()
         if self._pending:
-            _step.finish(self._state, lists.near, self.gravity, self.time_step, lists.worst)
+            _step.finish(
+                self._state, lists.near, lists.rigid, self.gravity, lists.edge, self.time_step,
+                lists.worst,
+            )  # fmt: skip
             self._pending = False
         self._check_overlaps()
 

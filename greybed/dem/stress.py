@@ -30,7 +30,7 @@ def pair_forces(simulation: Simulation) -> tuple[NDArray[np.int64], Array, Array
         On the first one of each pair [N].
     branches : ndarray, shape (m, 3)
         From the centre of the second one to that of the first one, across periodic faces where
-        that is nearer [m].
+        that is nearer; of spheres of a body from and to its centre of mass [m].
     """
     lists = simulation._lists
     near, n = lists.near, len(lists.state.place)
@@ -51,6 +51,8 @@ def pair_forces(simulation: Simulation) -> tuple[NDArray[np.int64], Array, Array
     shift = near.shift[:m][acts].astype(np.int64)
     images = np.stack([shift // 9, shift // 3 % 3, shift % 3], axis=1) - 1
     branches = state.place[low, :3] - state.place[high, :3] - images * lists.edge
+    arms = simulation._arms()
+    branches = branches - arms[low] + arms[high]
     pairs = np.stack([lists.ident[low], lists.ident[high]], axis=1)
     return pairs, -alone.crossing[acts, :3], branches
 

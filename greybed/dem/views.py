@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from greybed.dem import _columns, _step
+from greybed.dem.bodies import Bodies, shown, turns
 from greybed.dem.lists import Lists
 from greybed.dem.particles import Energies
 
@@ -61,8 +62,37 @@ class Views:
 
     @property
     def masses(self) -> Array:
-        """Masses, shape (n,) [kg]."""
-        return self._in_order(self._state.motion[:, 6])
+        """Masses, shape (n,) [kg]; those of bodies are shared out by the volumes of spheres."""
+        mass, rigid = self._state.motion[:, 6].copy(), self._lists.rigid
+        if len(rigid.pose):
+            volume = self._state.place[rigid.member, 3] ** 3
+            whole = np.add.reduceat(volume, rigid.first[:-1])
+            mass[rigid.member] *= volume / np.repeat(whole, np.diff(rigid.first))
+        return self._in_order(mass)
+
+    @property
+    def bodies(self) -> Bodies:
+        """Rigid bodies, in the order of the input."""
+        return shown(self._lists.rigid)
+
+    @property
+    def body_of(self) -> Index:
+        """Number of the body that a sphere belongs to, or -1, shape (n,)."""
+        return self._in_order(self._state.body)
+
+    @property
+    def anchors(self) -> Array:
+        """Centres of mass, shape (n, 3): of the body for spheres of one, else their own [m]."""
+        return self._in_order(self._state.place[:, :3] - self._arms())
+
+    def _arms(self) -> Array:
+        """Spheres' centres less the centres of mass of their bodies, in the present order [m]."""
+        rigid = self._lists.rigid
+        arms = np.zeros((len(self._state.place), 3))
+        if len(rigid.pose):
+            turn = np.repeat(turns(rigid.pose[:, 3:]), np.diff(rigid.first), axis=0)
+            arms[rigid.member] = np.einsum("mij,mj->mi", turn, rigid.offset)
+        return arms
 
     @property
     def forces(self) -> Array:
@@ -81,14 +111,19 @@ class Views:
 
     @property
     def energies(self) -> Energies:
-        """Energies of motion, spin and height."""
-        m = self._state.motion
-        height = self._state.place[:, :3] @ self.gravity
-        return Energies(
-            float(0.5 * (m[:, 6] * (m[:, :3] ** 2).sum(axis=1)).sum()),
-            float(0.5 * (m[:, 7] * (m[:, 3:6] ** 2).sum(axis=1)).sum()),
-            float(-(m[:, 6] * height).sum()),
-        )
+        """Energies of motion, spin and height, of spheres and bodies."""
+        free = self._state.body < 0
+        m = self._state.motion[free]
+        height = self._state.place[free, :3] @ self.gravity
+        rigid = self._lists.rigid
+        mass, moments = rigid.bulk[:, 0], rigid.bulk[:, 1:]
+        v, momenta = rigid.swing[:, :3], rigid.swing[:, 3:]
+        kinetic = 0.5 * (m[:, 6] * (m[:, :3] ** 2).sum(axis=1)).sum()
+        kinetic += 0.5 * (mass * (v**2).sum(axis=1)).sum()
+        rotational = 0.5 * (m[:, 7] * (m[:, 3:6] ** 2).sum(axis=1)).sum()
+        rotational += 0.5 * (momenta**2 / moments).sum()
+        potential = -(m[:, 6] * height).sum() - (mass * (rigid.pose[:, :3] @ self.gravity)).sum()
+        return Energies(float(kinetic), float(rotational), float(potential))
 
     @property
     def contacts(self) -> Index:
