@@ -62,14 +62,12 @@ def rotate_freely(q, momentum, moments, dt):
 
 
 @njit(**_OPTIONS)
-def _kick_body(b, rigid, state, near, push, edge, dt, finish, start):
+def _kick_body(b, turn, load, force, rigid, state, near, push, edge, dt, finish, start):
     """Half kicks of one body, its way where a step starts, and then its spheres."""
     pose, swing, bulk = rigid.pose[b], rigid.swing[b], rigid.bulk[b]
     q, momentum, moments = pose[3:7], swing[3:6], bulk[1:4]
-    turn = np.empty((3, 3))
     turn_matrix(q, turn)
-    load = np.zeros(6)
-    force = np.empty(6)
+    load[:] = 0.0
     for k in range(rigid.first[b], rigid.first[b + 1]):
         i = rigid.member[k]
         for c in range(6):
@@ -121,20 +119,29 @@ def _kick_body(b, rigid, state, near, push, edge, dt, finish, start):
         state.motion[i, 3], state.motion[i, 4], state.motion[i, 5] = wx, wy, wz
 
 
+@njit(**_OPTIONS)
+def _kick_some(begin, end, rigid, state, near, push, edge, dt, finish, start):
+    turn, load, force = np.empty((3, 3)), np.empty(6), np.empty(6)
+    for b in range(begin, end):
+        _kick_body(b, turn, load, force, rigid, state, near, push, edge, dt, finish, start)
+
+
 @njit(parallel=True, **_OPTIONS)
-def _kick_bodies(rigid, state, near, push, edge, dt, finish, start):
-    for b in prange(rigid.first.size - 1):
-        _kick_body(np.int64(b), rigid, state, near, push, edge, dt, finish, start)
+def _kick_parts(rigid, state, near, push, edge, dt, finish, start):
+    bodies, parts = rigid.first.size - 1, near.block.size - 1
+    for p in prange(parts):
+        begin, end = np.int64(p * bodies // parts), np.int64((p + 1) * bodies // parts)
+        _kick_some(begin, end, rigid, state, near, push, edge, dt, finish, start)
 
 
 @njit(**_OPTIONS)
 def kick_bodies(rigid, state, near, push, edge, dt, finish, start):
     """Of all bodies, before the spheres: what waits in the loads is still there then."""
     if near.block.size == 2:
-        for b in range(rigid.first.size - 1):
-            _kick_body(b, rigid, state, near, push, edge, dt, finish, start)
+        last = np.int64(rigid.first.size - 1)
+        _kick_some(np.int64(0), last, rigid, state, near, push, edge, dt, finish, start)
     else:
-        _kick_bodies(rigid, state, near, push, edge, dt, finish, start)
+        _kick_parts(rigid, state, near, push, edge, dt, finish, start)
 
 
 @njit(**_OPTIONS)
