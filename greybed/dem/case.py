@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from dataclasses import dataclass, field, fields
 
@@ -10,6 +9,7 @@ from greybed.core.config import choice, quantity, read_case, rows, tables, vecto
 from greybed.core.errors import InputError
 from greybed.dem.case_tables import (
     NOWHERE,
+    SHAPES,
     WALLS,
     CompartmentsTable,
     ContactTable,
@@ -21,6 +21,7 @@ from greybed.dem.case_tables import (
     PackTable,
     PeriodicTable,
     PileTable,
+    ShapeTable,
     SinkTable,
     SolidTable,
     StreamTable,
@@ -46,6 +47,7 @@ class ParticleCase:
     law: LawTable = field(default_factory=LawTable)
     material: tuple[MaterialTable, ...] = rows(MaterialTable)
     contact: tuple[ContactTable, ...] = rows(ContactTable)
+    shape: tuple[ShapeTable, ...] = tables("kind", SHAPES, ())
     wall: tuple[WallTable, ...] = tables("kind", WALLS, ())
     particles: tuple[PackTable | StreamTable | FileTable, ...] = tables(
         "kind", {"pack": PackTable, "stream": StreamTable, "file": FileTable}
@@ -61,7 +63,7 @@ class ParticleCase:
     output: OutputTable
 
     def __post_init__(self) -> None:
-        for what in ("material", "wall", "sink", "measure"):
+        for what in ("material", "shape", "wall", "sink", "measure"):
             names = [item.name for item in getattr(self, what)]
             twice = sorted({name for name in names if names.count(name) > 1})
             if twice:
@@ -71,6 +73,13 @@ class ParticleCase:
             if part.material is not None and part.material not in known:
                 raise InputError(
                     f"no material is called {part.material!r}; there are {', '.join(known)}."
+                )
+        shapes = [shape.name for shape in self.shape]
+        for table in self.particles:
+            shape = getattr(table, "shape", None)
+            if shape is not None and shape not in shapes:
+                raise InputError(
+                    f"no shape is called {shape!r}; there are {', '.join(shapes) or 'none'}."
                 )
         first = [getattr(p, "at", getattr(p, "starts", 0.0)) for p in self.particles]
         if not first or min(first) > 0.0:
@@ -115,14 +124,6 @@ class ParticleCase:
             )
             for wall in self.wall
         ]
-
-    def smallest_radius(self, material: str) -> float:
-        """Of the drawn particles of a material [m]; infinite where none is drawn."""
-        least = math.inf
-        for table in self.particles:
-            if isinstance(table, (PackTable, StreamTable)) and table.material == material:
-                least = min(least, float(table.distribution.radii(1000).min()))
-        return least
 
 
 def load_particle_case(path: str | os.PathLike[str]) -> ParticleCase:
