@@ -101,7 +101,7 @@ class ParticleRun:
             self.tally.streamed, self.tally.inserted, self.tally.batches,
         )  # fmt: skip
         step = case.time_step
-        if step is None and case.law.normal == "hertz":
+        if step is None and case.contact_law.from_moduli:
             step = 0.1 * self.feed.shortest_time()
         batches = self.feed.at_start()
         spheres = [batch for batch in batches if batch.shape is None]
