@@ -19,6 +19,7 @@ from greybed.dem.checkpoint import restore, save
 from greybed.dem.feeding import Feed
 from greybed.dem.measures import bed_height
 from greybed.dem.simulation import Simulation
+from greybed.dem.slopes import slopes
 
 Array = NDArray[np.float64]
 
@@ -229,6 +230,7 @@ class ParticleRun:
         for wall, force in zip(self.case.wall, sim.wall_forces, strict=True):
             for axis, value in zip("xyz", force, strict=True):
                 row[f"force {axis} on {wall.name} [N]"] = float(value)
+        row |= slopes(self.case, sim)
         self.tally.history.append(row)
 
     # -- files ------------------------------------------------------------------------------
