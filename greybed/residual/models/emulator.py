@@ -112,11 +112,17 @@ class Emulator:
         return self.base + float(np.dot(self._features(point), self._weights))
 
     def value(self, parameters: Mapping[str, float], amplitudes: Mapping[str, float]) -> float:
-        """Output between the runs; the base exactly where nothing differs from it."""
+        """Output between the runs; the base exactly where nothing differs from it.
+
+        Amplitudes beyond those of the runs count as the last one: a cubic through scattered runs
+        would go anywhere there, and explain anything.
+        """
         knobs = {
             k.name: (parameters[k.name] - k.value) / k.step
             for k in self._knobs
             if k.name in parameters
         }
-        effects = {e.name: amplitudes.get(e.name, 0.0) / e.typical for e in self._effects}
+        effects = {
+            e.name: min(amplitudes.get(e.name, 0.0) / e.typical, SHARES[-1]) for e in self._effects
+        }
         return self._at((knobs, effects))
