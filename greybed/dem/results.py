@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from greybed.core.errors import InputError
 from greybed.dem import measures
 from greybed.dem.case_tables import CompartmentsTable, PileTable
 from greybed.dem.runner import ParticleRun
+from greybed.dem.slopes import mean_slope, slope_now
 
 
 def results_of(run: ParticleRun) -> dict[str, Any]:
@@ -70,23 +70,7 @@ def _measure(run: ParticleRun, table: Any) -> dict[str, Any]:
     sim = run.simulation
     x, r = sim.centres, sim.radii
     if isinstance(table, PileTable):
-        chosen = x[:, 2] > table.above
-        axis = {"heap": None, "x": 0, "y": 1}[table.axis]
-        if axis is not None:
-            chosen &= (x[:, axis] > table.lower) & (x[:, axis] < table.upper)
-        if not chosen.any():
-            return {"angle_deg": None, "why": "no particle is there"}
-        profile = measures.pile_profile(x[chosen], r[chosen], table.width, axis=axis)
-        known = np.isfinite(profile.height)
-        found: dict[str, Any] = {
-            "position_m": profile.position[known].tolist(),
-            "height_m": profile.height[known].tolist(),
-        }
-        try:
-            angle, error = profile.slope()
-        except InputError as refusal:
-            return {**found, "angle_deg": None, "why": str(refusal)}
-        return {**found, "angle_deg": angle, "angle_stderr_deg": error}
+        return {**slope_now(sim, table), **mean_slope(table, run.tally.history)}
     if isinstance(table, CompartmentsTable):
         edges = np.linspace(table.lower, table.upper, table.count + 1)
         shares, intensity = measures.segregation(
