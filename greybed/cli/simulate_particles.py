@@ -113,7 +113,9 @@ class _Frames:
         import numpy as np
 
         sim = self.run.simulation
+        heat = self.run.heat
         return {
+            **({} if heat is None else {"temperature [K]": heat.temperatures}),
             "velocity [m/s]": sim.velocities,
             "spin [rad/s]": sim.spins,
             "speed [m/s]": np.sqrt((sim.velocities**2).sum(axis=1)),
@@ -160,8 +162,10 @@ class _Frames:
             write_film(self.folder.parent / "movie.gif", pictures, 6.0)
 
     def values(self) -> Any:
-        """What pictures are coloured by: the material where there are several, else the height."""
+        """What pictures are coloured by: the temperature where there is one, or the material."""
         sim = self.run.simulation
+        if self.run.heat is not None:
+            return self.run.heat.temperatures
         if len(set(sim.kinds.tolist())) > 1:
             return sim.kinds
         # By the label: one sees what was where at the start.
@@ -169,6 +173,10 @@ class _Frames:
 
     def limits(self) -> tuple[float, float]:
         values = self.values()
+        if (case := self.run.case).heat is not None:
+            tables = (*case.wall, *case.particles, case.heat)
+            known = [t.temperature for t in tables if t.temperature is not None]
+            return min(known), max(*known, min(known) + 1.0)
         return float(min(values.min(), 0)), float(max(values.max(), 1))
 
     def _stage(self) -> Any:

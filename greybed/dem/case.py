@@ -8,13 +8,16 @@ from dataclasses import dataclass, field, fields
 
 from greybed.core.config import choice, quantity, read_case, rows, tables, vector, whole
 from greybed.core.errors import InputError
+from greybed.dem.case_heat import check_heat
 from greybed.dem.case_tables import (
     NOWHERE,
     WALLS,
     CompartmentsTable,
+    ConductionTable,
     ContactTable,
     EffectsTable,
     FileTable,
+    HeatTable,
     LawTable,
     MaterialTable,
     OutputTable,
@@ -24,11 +27,21 @@ from greybed.dem.case_tables import (
     SinkTable,
     SolidTable,
     StreamTable,
+    StressTable,
     WallTable,
 )
 from greybed.dem.laws import ContactLaw
 from greybed.dem.materials import Contact
 from greybed.dem.walls import SolidWall
+
+MeasureTable = PileTable | CompartmentsTable | SolidTable | StressTable | ConductionTable
+MEASURES = {
+    "pile": PileTable,
+    "compartments": CompartmentsTable,
+    "solid": SolidTable,
+    "stress": StressTable,
+    "conduction": ConductionTable,
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,11 +65,10 @@ class ParticleCase:
     )
     periodic: PeriodicTable | None = None
     sink: tuple[SinkTable, ...] = rows(SinkTable, ())
-    measure: tuple[PileTable | CompartmentsTable | SolidTable, ...] = tables(
-        "kind",
-        {"pile": PileTable, "compartments": CompartmentsTable, "solid": SolidTable},
-        (),
-    )
+    measure: tuple[MeasureTable, ...] = tables("kind", MEASURES, ())
+    heat: HeatTable | None = None
+    # Particles that stand for the cube of this number of real ones; see greybed.dem.coarse.
+    coarse_graining: float = quantity("dimensionless", 1.0, at_least=1.0)
     effects: EffectsTable = field(default_factory=EffectsTable)
     output: OutputTable
 
@@ -77,6 +89,7 @@ class ParticleCase:
             raise InputError(
                 "no particles are there at the start; let one [[particles]] begin at time 0."
             )
+        check_heat(self)
 
     @property
     def contact_law(self) -> ContactLaw:

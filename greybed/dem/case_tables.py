@@ -42,6 +42,8 @@ class MaterialTable:
     density: float = quantity("density", above=0.0)  # [kg/m3]
     youngs_modulus: float = quantity("pressure", above=0.0)  # [Pa]
     poissons_ratio: float = quantity("dimensionless", above=-1.0, at_most=0.5)  # [-]
+    conductivity: float | None = quantity("conductivity", None, above=0.0)  # [W/m/K]
+    heat_capacity: float | None = quantity("heat capacity", None, above=0.0)  # [J/kg/K]
 
     @property
     def material(self) -> Material:
@@ -95,6 +97,7 @@ class _Solid:
     # Force of the particles on the wall along its velocity that moves it no further [N]: the
     # wall goes at its velocity where nothing holds it, and back where more than that pushes.
     servo: float | None = quantity("force", None, above=0.0)
+    temperature: float | None = quantity("temperature", None, above=0.0)  # [K]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,6 +147,7 @@ class _Sourced:
 
     material: str
     velocity: tuple[float, float, float] = vector("velocity", NOWHERE)  # [m/s]
+    temperature: float | None = quantity("temperature", None, above=0.0)  # [K]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -214,6 +218,7 @@ class PileTable:
     width: float = quantity("length", above=0.0)  # of a bin [m]
     axis: str = choice(("heap", "x", "y"), "heap")
     above: float = quantity("length", -1e30)  # only spheres with centres above this height [m]
+    below: float = quantity("length", 1e30)  # and below this one [m]
     lower: float = quantity("length", -1e30)  # and between these two along the axis [m]
     upper: float = quantity("length", 1e30)
 
@@ -239,6 +244,45 @@ class SolidTable:
 
 
 @dataclass(frozen=True, kw_only=True)
+class StressTable:
+    """``[[measure]]`` with ``kind = "stress"``: mean stress of the contacts in a box at the end."""
+
+    name: str
+    lower: tuple[float, float, float] = vector("length")  # [m]
+    upper: tuple[float, float, float] = vector("length")  # [m]
+
+    def __post_init__(self) -> None:
+        Region(self.lower, self.upper)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConductionTable:
+    """``[[measure]]`` with ``kind = "conduction"``: heat between two walls over the gradient."""
+
+    name: str
+    walls: tuple[str, ...] = words()  # the two that heat flows between
+    axis: str = choice(("x", "y", "z"), "z")
+    lower: float = quantity("length")  # of the particles that the gradient is found from [m]
+    upper: float = quantity("length")  # [m]
+    area: float = quantity("area", above=0.0)  # across the axis [m2]
+    share: float = quantity("dimensionless", 0.2, above=0.0, at_most=1.0)  # of the time, last [-]
+
+    def __post_init__(self) -> None:
+        if len(self.walls) != 2 or self.walls[0] == self.walls[1]:
+            raise InputError(f'walls = {list(self.walls)} must be two names, ["hot", "cold"].')
+        if not self.lower < self.upper:
+            raise InputError(f"lower = {self.lower:g} must be below upper = {self.upper:g} [m].")
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeatTable:
+    """``[heat]``: particles have temperatures, and heat flows through contacts."""
+
+    temperature: float = quantity("temperature", above=0.0)  # where a table says no other [K]
+    stiffness_ratio: float = quantity("dimensionless", 1.0, above=0.0)  # real over simulated [-]
+
+
+@dataclass(frozen=True, kw_only=True)
 class PeriodicTable:
     """``[periodic]``: the box that repeats along the axes that are named."""
 
@@ -254,6 +298,7 @@ class OutputTable:
     samples: float = quantity("time", above=0.0)  # rows of history.csv [s]
     frames: float | None = quantity("time", None, above=0.0)  # VTU files; none by default [s]
     checkpoints: float | None = quantity("time", None, above=0.0)  # a tenth of the run [s]
+    format: str = choice(("vtu", "vtkhdf"), "vtu")  # of the frames
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,8 +9,10 @@ import numpy as np
 
 from greybed.core.errors import InputError
 from greybed.dem import measures
-from greybed.dem.case_tables import CompartmentsTable, PileTable
+from greybed.dem.case_heat import conduction, heat_results
+from greybed.dem.case_tables import CompartmentsTable, ConductionTable, PileTable, StressTable
 from greybed.dem.runner import ParticleRun
+from greybed.dem.stress import stress_in
 
 
 def results_of(run: ParticleRun) -> dict[str, Any]:
@@ -30,6 +32,7 @@ def results_of(run: ParticleRun) -> dict[str, Any]:
         "kinetic_energy_J": energy.kinetic,
         "inserted": list(tally.inserted),
         "bytes_per_particle": sim.bytes_per_particle,
+        **({"heat": heat_results(case, run.heat, tally.history)} if run.heat else {}),
         "sinks": {
             sink.name: {
                 "mass_kg": tally.sunk[k],
@@ -60,7 +63,7 @@ def _measure(run: ParticleRun, table: Any) -> dict[str, Any]:
     sim = run.simulation
     x, r = sim.centres, sim.radii
     if isinstance(table, PileTable):
-        chosen = x[:, 2] > table.above
+        chosen = (x[:, 2] > table.above) & (x[:, 2] < table.below)
         axis = {"heap": None, "x": 0, "y": 1}[table.axis]
         if axis is not None:
             chosen &= (x[:, axis] > table.lower) & (x[:, axis] < table.upper)
@@ -88,6 +91,12 @@ def _measure(run: ParticleRun, table: Any) -> dict[str, Any]:
             "materials": [m.name for m in sim.materials[: shares.shape[1]]],
             "intensity_of_segregation": None if math.isnan(intensity) else intensity,
         }
+    if isinstance(table, StressTable):
+        tensor = stress_in(sim, table.lower, table.upper)
+        return {"stress_Pa": tensor.tolist(), "pressure_Pa": float(np.trace(tensor)) / 3.0}
+    if isinstance(table, ConductionTable):
+        assert run.heat is not None  # the case has been checked
+        return conduction(table, sim, run.heat, run.tally.history)
     field = measures.solid_field(x, r, table.lower, table.upper, (1, 1, 1))
     inside = ((x > np.array(table.lower)) & (x < np.array(table.upper))).all(axis=1)
     return {

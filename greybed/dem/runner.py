@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 from greybed.core.errors import InputError
 from greybed.core.packing import Packing
 from greybed.dem.case import ParticleCase
+from greybed.dem.case_heat import heat_of, sample_of, start_of
 from greybed.dem.case_tables import FileTable, PackTable, StreamTable
 from greybed.dem.checkpoint import restore, save
+from greybed.dem.coarse import coarse_case
 from greybed.dem.insertion import random_places
 from greybed.dem.measures import bed_height
 from greybed.dem.particles import rayleigh_time
@@ -87,7 +89,7 @@ class ParticleRun:
     def __init__(
         self, case: ParticleCase, packings: dict[int, Packing], *, threads: int | None = None
     ) -> None:
-        self.case = case
+        self.case = case = coarse_case(case)
         tables, walls = case.particles, case.wall
         self.tally = Tally(
             [0.0] * len(tables), [0] * len(tables), [0] * len(tables),
@@ -116,6 +118,11 @@ class ParticleRun:
         self.look = LOOK if case.look is None else max(1, round(case.look / dt))
         self._sample = max(1, round(case.output.samples / dt))
         self.emptied = False
+        counts = [
+            len(packings[k]) if isinstance(table, FileTable) else self.tally.inserted[k]
+            for k, table in enumerate(tables)
+        ]
+        self.heat = heat_of(case, self.simulation, self._names, counts)
         if not self.tally.history:
             self._note()
 
@@ -201,6 +208,7 @@ class ParticleRun:
         end = self.steps if until is None else min(until, self.steps)
         while sim.steps < end:
             before = sim.steps
+            self._warm()
             self._events(before)
             if self.emptied:
                 self._note()
@@ -208,9 +216,16 @@ class ParticleRun:
             stop = min(end, (before // self.look + 1) * self.look)
             stop = min(stop, (before // self._sample + 1) * self._sample)
             sim.run(stop - before)
+            self._warm()
             if sim.steps % self._sample == 0 or sim.steps == self.steps:
                 self._note()
             yield sim.steps - before
+
+    def _warm(self) -> None:
+        """Let heat catch up, at looks and at the end only: a stop between them changes no bit."""
+        steps = self.simulation.steps
+        if self.heat is not None and (steps % self.look == 0 or steps == self.steps):
+            self.heat.catch_up()
 
     def _events(self, step: int) -> None:
         """What begins, comes or goes at this step."""
@@ -246,6 +261,8 @@ class ParticleRun:
                         x, r, kinds=np.full(len(x), self._names.index(table.material)),
                         velocities=np.broadcast_to(np.array(table.velocity), x.shape),
                     )  # fmt: skip
+                if self.heat is not None:
+                    self.heat.arrive(start_of(case, number))
 
     def _servo(self, k: int) -> None:
         """Turn a wall's speed towards where its force is the wanted one."""
@@ -298,18 +315,24 @@ class ParticleRun:
         for wall, force in zip(self.case.wall, sim.wall_forces, strict=True):
             for axis, value in zip("xyz", force, strict=True):
                 row[f"force {axis} on {wall.name} [N]"] = float(value)
+        if self.heat is not None:
+            row |= sample_of(self.case, self.heat)
         self.tally.history.append(row)
 
     # -- files ------------------------------------------------------------------------------
 
     def save(self, path: str | os.PathLike[str], **extra: Any) -> Path:
         """Write a checkpoint, with the tallies and what else is given."""
-        return save(self.simulation, path, tally=vars(self.tally), **extra)
+        heat = None if self.heat is None else self.heat.state()
+        return save(self.simulation, path, tally=vars(self.tally), heat=heat, **extra)
 
     def restore(self, path: str | os.PathLike[str]) -> dict[str, Any]:
         """Go back to a checkpoint; returns what else was given to :meth:`save`."""
         extra = restore(self.simulation, path)
         self.tally = Tally(**extra.pop("tally"))
+        kept = extra.pop("heat", None)
+        if self.heat is not None:
+            self.heat.go_back(kept)
         return extra
 
 
