@@ -12,8 +12,6 @@ from greybed.dem.case_heat import check_heat
 from greybed.dem.case_tables import (
     NOWHERE,
     WALLS,
-    CompartmentsTable,
-    ConductionTable,
     ContactTable,
     EffectsTable,
     FileTable,
@@ -23,25 +21,21 @@ from greybed.dem.case_tables import (
     OutputTable,
     PackTable,
     PeriodicTable,
-    PileTable,
+    PlaneTable,
     SinkTable,
-    SolidTable,
     StreamTable,
-    StressTable,
     WallTable,
 )
 from greybed.dem.laws import ContactLaw
 from greybed.dem.materials import Contact
+from greybed.dem.measure_tables import (
+    MEASURES,
+    ConductionTable,
+    MeasureTable,
+    ShearTable,
+    SlipTable,
+)
 from greybed.dem.walls import SolidWall
-
-MeasureTable = PileTable | CompartmentsTable | SolidTable | StressTable | ConductionTable
-MEASURES = {
-    "pile": PileTable,
-    "compartments": CompartmentsTable,
-    "solid": SolidTable,
-    "stress": StressTable,
-    "conduction": ConductionTable,
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +83,27 @@ class ParticleCase:
             raise InputError(
                 "no particles are there at the start; let one [[particles]] begin at time 0."
             )
+        self._check_walls_of_measures()
         check_heat(self)
+
+    def _check_walls_of_measures(self) -> None:
+        planes = [wall.name for wall in self.wall if isinstance(wall, PlaneTable)]
+        walls = [wall.name for wall in self.wall]
+        for table in self.measure:
+            wanted: tuple[tuple[str, list[str]], ...] = ()
+            if isinstance(table, ConductionTable):
+                wanted = tuple((name, walls) for name in table.walls)
+            elif isinstance(table, ShearTable):
+                wanted = tuple((name, walls) for name in (*table.walls, table.load))
+            elif isinstance(table, SlipTable):
+                wanted = ((table.wall, planes),)
+            for name, known in wanted:
+                if name not in known:
+                    what = "plane" if known is planes else "wall"
+                    raise InputError(
+                        f"measure {table.name!r}: no {what} is called {name!r}; there are "
+                        f"{', '.join(known) or 'none'}."
+                    )
 
     @property
     def contact_law(self) -> ContactLaw:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from greybed.core.errors import InputError
-from greybed.dem.case_tables import ConductionTable
 from greybed.dem.heat import Heat
+from greybed.dem.measure_tables import ConductionTable
 from greybed.dem.simulation import Simulation
 
 if TYPE_CHECKING:

@@ -9,8 +9,16 @@ import numpy as np
 
 from greybed.core.errors import InputError
 from greybed.dem import measures
+from greybed.dem.bulk_tests import shear_result, slip_result
 from greybed.dem.case_heat import conduction, heat_results
-from greybed.dem.case_tables import CompartmentsTable, ConductionTable, PileTable, StressTable
+from greybed.dem.measure_tables import (
+    CompartmentsTable,
+    ConductionTable,
+    PileTable,
+    ShearTable,
+    SlipTable,
+    StressTable,
+)
 from greybed.dem.runner import ParticleRun
 from greybed.dem.stress import stress_in
 
@@ -94,6 +102,10 @@ def _measure(run: ParticleRun, table: Any) -> dict[str, Any]:
     if isinstance(table, StressTable):
         tensor = stress_in(sim, table.lower, table.upper)
         return {"stress_Pa": tensor.tolist(), "pressure_Pa": float(np.trace(tensor)) / 3.0}
+    if isinstance(table, ShearTable):
+        return shear_result(table, run.tally.history)
+    if isinstance(table, SlipTable):
+        return slip_result(table, run.tally.history)
     if isinstance(table, ConductionTable):
         assert run.heat is not None  # the case has been checked
         return conduction(table, sim, run.heat, run.tally.history)
