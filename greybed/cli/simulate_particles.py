@@ -35,9 +35,11 @@ def run_particles(options: argparse.Namespace) -> int:
     folder = output_folder(options.out)
     checkpoint = folder / CHECKPOINT
     with sole_writer(folder / ".simulate.lock"):
-        run = ParticleRun(
-            case, {k: read_packing(path) for k, path in files.items()}, threads=options.threads
-        )
+        packings = {k: read_packing(path) for k, path in files.items()}
+        try:
+            run = ParticleRun(case, packings, threads=options.threads)
+        except InputError as error:
+            raise InputError(f"{options.case}: {error}") from None
         found = 0
         kept = kept_with(checkpoint)
         if kept is not None and kept.get("key") == key:
@@ -50,7 +52,10 @@ def run_particles(options: argparse.Namespace) -> int:
         with progress(run.steps, "time steps", show=not options.quiet) as advance:
             advance(found)
             if not found:
+                frames.clear()
                 frames.write()
+                # A run that fails at once leaves a state, too.
+                run.save(checkpoint, key=key)
             try:
                 for done in run.go_on():
                     moved += done * len(run.simulation.radii)
@@ -66,8 +71,10 @@ def run_particles(options: argparse.Namespace) -> int:
                     run.save(checkpoint, key=key)
                 raise
             except InputError as error:
-                last = f"The last good state is in {checkpoint}." if checkpoint.exists() else ""
-                raise InputError(f"{options.case}: {error} {last}".strip()) from None
+                said = str(error).removesuffix(".")
+                raise InputError(
+                    f"{options.case}: {said}; the last good state is in {checkpoint}."
+                ) from None
         seconds = time.perf_counter() - begin
         _write_history(folder / "history.csv", run)
         final = frames.packing()
@@ -122,6 +129,11 @@ class _Frames:
             "label": sim.labels.astype(np.float64),
             "material": sim.kinds.astype(np.float64),
         }
+
+    def clear(self) -> None:
+        """Take away frames of an older run in the same folder."""
+        for old in self.folder.glob("frame_*"):
+            old.unlink()
 
     def write(self) -> None:
         """Write the frame of now."""

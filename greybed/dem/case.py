@@ -6,12 +6,15 @@ import math
 import os
 from dataclasses import dataclass, field, fields
 
+import numpy as np
+
 from greybed.core.config import choice, quantity, read_case, rows, tables, vector, whole
 from greybed.core.errors import InputError
 from greybed.dem.case_heat import check_heat
 from greybed.dem.case_tables import (
     NOWHERE,
     WALLS,
+    BoundsTable,
     ContactTable,
     EffectsTable,
     FileTable,
@@ -58,6 +61,7 @@ class ParticleCase:
         "kind", {"pack": PackTable, "stream": StreamTable, "file": FileTable}
     )
     periodic: PeriodicTable | None = None
+    bounds: BoundsTable | None = None
     sink: tuple[SinkTable, ...] = rows(SinkTable, ())
     measure: tuple[MeasureTable, ...] = tables("kind", MEASURES, ())
     heat: HeatTable | None = None
@@ -83,6 +87,10 @@ class ParticleCase:
             raise InputError(
                 "no particles are there at the start; let one [[particles]] begin at time 0."
             )
+        for number, table in enumerate(self.particles):
+            # Those that come later must not stop the run then.
+            if isinstance(table, PackTable) and table.at > 0.0:
+                _check_room(number, table)
         self._check_walls_of_measures()
         check_heat(self)
 
@@ -150,6 +158,18 @@ class ParticleCase:
             if isinstance(table, (PackTable, StreamTable)) and table.material == material:
                 least = min(least, float(table.distribution.radii(1000).min()))
         return least
+
+
+def _check_room(number: int, table: PackTable) -> None:
+    """Refuse a pack that cannot fit, whatever the places: random ones fill a third."""
+    size = np.array(table.upper) - np.array(table.lower)
+    region = float(size.prod()) * (0.25 * math.pi if table.round else 1.0)
+    solid = 4.0 / 3.0 * math.pi * float((table.distribution.radii(table.count) ** 3).sum())
+    if solid > 0.6 * region:
+        raise InputError(
+            f"particles[{number}]: {table.count} particles of {solid:.3g} [m3] find no room in a "
+            f"region of {region:.3g} [m3]; make it larger, or insert fewer."
+        )
 
 
 def load_particle_case(path: str | os.PathLike[str]) -> ParticleCase:

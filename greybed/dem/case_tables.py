@@ -16,6 +16,7 @@ from greybed.core.wall_tables import (
     PlaneShape,
     RectangleShape,
 )
+from greybed.core.walls import Mesh, Wall
 from greybed.dem.insertion import Region
 from greybed.dem.laws import COHESION, NORMAL, ROLLING
 from greybed.dem.materials import Contact, Material
@@ -127,7 +128,25 @@ class RectangleTable(RectangleShape, _Solid):
 
 @dataclass(frozen=True, kw_only=True)
 class MeshTable(MeshShape, _Solid):
-    """``[[wall]]`` with ``kind = "mesh"``."""
+    """``[[wall]]`` with ``kind = "mesh"``: closed, or said to be open."""
+
+    open: bool = False
+
+    def wall(self) -> Wall:
+        """The wall itself.
+
+        Raises
+        ------
+        InputError
+            If the file has holes and nobody said so: particles would fall through.
+        """
+        mesh = super().wall()
+        if isinstance(mesh, Mesh) and not (self.open or mesh.watertight):
+            raise InputError(
+                f"wall {self.name!r}: the mesh {self.file} has holes or open rims, where particles "
+                "fall through; mend it, or say open = true if that is its shape."
+            )
+        return mesh
 
 
 WallTable = PlaneTable | CylinderTable | ConeTable | DiscTable | RectangleTable | MeshTable
@@ -216,6 +235,17 @@ class HeatTable:
 
     temperature: float = quantity("temperature", above=0.0)  # where a table says no other [K]
     stiffness_ratio: float = quantity("dimensionless", 1.0, above=0.0)  # real over simulated [-]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoundsTable:
+    """``[bounds]``: the box that no particle may leave, looked after at each look."""
+
+    lower: tuple[float, float, float] = vector("length")  # [m]
+    upper: tuple[float, float, float] = vector("length")  # [m]
+
+    def __post_init__(self) -> None:
+        Region(self.lower, self.upper)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,7 +17,7 @@ from greybed.core.packing import Packing
 from greybed.dem.bulk_tests import slips
 from greybed.dem.case import ParticleCase
 from greybed.dem.case_heat import heat_of, sample_of, start_of
-from greybed.dem.case_tables import FileTable, PackTable, StreamTable
+from greybed.dem.case_tables import BoundsTable, FileTable, PackTable, StreamTable
 from greybed.dem.checkpoint import restore, save
 from greybed.dem.coarse import coarse_case
 from greybed.dem.insertion import random_places
@@ -248,6 +248,8 @@ class ParticleRun:
         if step % self.look:
             return
         self._sink()
+        if case.bounds is not None:
+            self._check_bounds(case.bounds)
         if step == 0:
             return
         for number, table in enumerate(case.particles):
@@ -279,6 +281,18 @@ class ParticleRun:
         tally.servo[k] += _SERVO * (wanted - tally.servo[k])
         share = tally.servo[k]
         self.simulation.move_wall(wall.name, tuple(share * v for v in wall.velocity))
+
+    def _check_bounds(self, bounds: BoundsTable) -> None:
+        sim = self.simulation
+        x = sim.centres
+        out = ((x < np.array(bounds.lower)) | (x > np.array(bounds.upper))).any(axis=1)
+        if out.any():
+            who = int(out.argmax())
+            place = ", ".join(f"{c:.4g}" for c in x[who])
+            raise InputError(
+                f"step {sim.steps}: particle {int(sim.labels[who])} is at ({place}) [m], outside "
+                "the bounds; close the walls, check that none is passed, or put a [[sink]] there."
+            )
 
     def _sink(self) -> None:
         sim = self.simulation
