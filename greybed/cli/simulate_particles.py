@@ -140,10 +140,15 @@ class _Frames:
         if self.every is None:
             return
         from greybed.core.writers import write_packing
+        from greybed.core.writers.vtkhdf import write_part
 
         self.folder.mkdir(exist_ok=True)
-        name = f"frame_{self.run.simulation.steps:010d}"
-        write_packing(self.packing(), self.folder / f"{name}.vtu", fields=self.fields())
+        sim = self.run.simulation
+        name = f"frame_{sim.steps:010d}"
+        if self.run.case.output.format == "vtkhdf":
+            write_part(self.folder / f"{name}.npz", self.packing(), self.fields(), sim.time)
+        else:
+            write_packing(self.packing(), self.folder / f"{name}.vtu", fields=self.fields())
         if self.movie:
             from greybed.report.particles import frame_picture, write_frame
 
@@ -154,6 +159,18 @@ class _Frames:
         """Write the collection of all frames, and the film."""
         if self.every is None:
             return
+        if self.run.case.output.format == "vtkhdf":
+            self._join()
+        else:
+            self._collect()
+        pictures = sorted(self.folder.glob("frame_*.png"))
+        if self.movie and pictures:
+            from greybed.report.particles import write_film
+
+            write_film(self.folder.parent / "movie.gif", pictures, 6.0)
+
+    def _collect(self) -> None:
+        """One page that lists the VTU files."""
         from greybed.core.files import atomic_path
 
         dt = self.run.simulation.time_step
@@ -167,11 +184,16 @@ class _Frames:
                 '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
                 f"{rows}</Collection>\n</VTKFile>\n"
             )
-        pictures = sorted(self.folder.glob("frame_*.png"))
-        if self.movie and pictures:
-            from greybed.report.particles import write_film
 
-            write_film(self.folder.parent / "movie.gif", pictures, 6.0)
+    def _join(self) -> None:
+        """One VTKHDF file of all parts, which go; where they have gone before, it is there."""
+        from greybed.core.writers.vtkhdf import join_parts
+
+        parts = sorted(self.folder.glob("frame_*.npz"))
+        if parts:
+            join_parts(self.folder.parent / "frames.vtkhdf", parts)
+        for part in parts:
+            part.unlink()
 
     def values(self) -> Any:
         """What pictures are coloured by: the temperature where there is one, or the material."""

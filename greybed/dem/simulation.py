@@ -294,7 +294,7 @@ class Simulation(Population):
         place = ", ".join(f"{c:.4g}" for c in self._state.place[who, :3])
         raise InputError(
             f"step {self.steps}: particle {int(self._lists.ident[who])} at ({place}) [m] moves at "
-            f"{speed[who]:.3g} m/s, more than its radius {r[who]:.3g} [m] in a step, and could pass "
+            f"{speed[who]:.3g} m/s, more than its radius {r[who]:.3g} m in a step, and could pass "
             "through others; take a smaller time step, and check its velocity and overlaps."
         )
 
