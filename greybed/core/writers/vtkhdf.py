@@ -46,7 +46,7 @@ def write_part(
     OutputError
         If the file cannot be written.
     """
-    arrays: dict[str, NDArray[np.float64]] = {"radius [m]": packing.radii}
+    arrays: dict[str, NDArray[np.float64]] = {"radius": packing.radii}
     for name, values in fields.items():
         array = np.asarray(values, dtype=np.float64)
         if array.ndim not in (1, 2) or len(array) != len(packing):
