@@ -22,7 +22,7 @@ def run_particles(options: argparse.Namespace) -> int:
     from greybed.core.readers import read_packing
     from greybed.core.writers import write_packing
     from greybed.dem.case import load_particle_case
-    from greybed.dem.case_tables import FileTable, MeshTable
+    from greybed.dem.case_tables import FileTable
     from greybed.dem.checkpoint import kept_with
     from greybed.dem.results import results_of
     from greybed.dem.runner import ParticleRun
@@ -30,7 +30,7 @@ def run_particles(options: argparse.Namespace) -> int:
     case = load_particle_case(options.case)
     files = {k: t.file for k, t in enumerate(case.particles) if isinstance(t, FileTable)}
     inputs = [options.case, *files.values()]
-    inputs += [wall.file for wall in case.wall if isinstance(wall, MeshTable)]
+    inputs += [part.file for part in (*case.wall, *case.shape) if hasattr(part, "file")]
     key = "".join(sha256_of(path) for path in inputs)
     folder = output_folder(options.out)
     checkpoint = folder / CHECKPOINT
@@ -128,6 +128,7 @@ class _Frames:
             "speed [m/s]": np.sqrt((sim.velocities**2).sum(axis=1)),
             "label": sim.labels.astype(np.float64),
             "material": sim.kinds.astype(np.float64),
+            "body": sim.body_of.astype(np.float64),
         }
 
     def clear(self) -> None:

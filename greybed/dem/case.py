@@ -13,6 +13,7 @@ from greybed.core.errors import InputError
 from greybed.dem.case_heat import check_heat
 from greybed.dem.case_tables import (
     NOWHERE,
+    SHAPES,
     WALLS,
     BoundsTable,
     ContactTable,
@@ -25,6 +26,7 @@ from greybed.dem.case_tables import (
     PackTable,
     PeriodicTable,
     PlaneTable,
+    ShapeTable,
     SinkTable,
     StreamTable,
     WallTable,
@@ -56,6 +58,7 @@ class ParticleCase:
     law: LawTable = field(default_factory=LawTable)
     material: tuple[MaterialTable, ...] = rows(MaterialTable)
     contact: tuple[ContactTable, ...] = rows(ContactTable)
+    shape: tuple[ShapeTable, ...] = tables("kind", SHAPES, ())
     wall: tuple[WallTable, ...] = tables("kind", WALLS, ())
     particles: tuple[PackTable | StreamTable | FileTable, ...] = tables(
         "kind", {"pack": PackTable, "stream": StreamTable, "file": FileTable}
@@ -71,7 +74,7 @@ class ParticleCase:
     output: OutputTable
 
     def __post_init__(self) -> None:
-        for what in ("material", "wall", "sink", "measure"):
+        for what in ("material", "shape", "wall", "sink", "measure"):
             names = [item.name for item in getattr(self, what)]
             twice = sorted({name for name in names if names.count(name) > 1})
             if twice:
@@ -82,6 +85,13 @@ class ParticleCase:
                 raise InputError(
                     f"no material is called {part.material!r}; there are {', '.join(known)}."
                 )
+        shapes = [shape.name for shape in self.shape]
+        for table in self.particles:
+            shape = getattr(table, "shape", None)
+            if shape is not None and shape not in shapes:
+                raise InputError(
+                    f"no shape is called {shape!r}; there are {', '.join(shapes) or 'none'}."
+                )
         first = [getattr(p, "at", getattr(p, "starts", 0.0)) for p in self.particles]
         if not first or min(first) > 0.0:
             raise InputError(
@@ -89,7 +99,7 @@ class ParticleCase:
             )
         for number, table in enumerate(self.particles):
             # Those that come later must not stop the run then.
-            if isinstance(table, PackTable) and table.at > 0.0:
+            if isinstance(table, PackTable) and table.at > 0.0 and table.sizes is not None:
                 _check_room(number, table)
         self._check_walls_of_measures()
         check_heat(self)
@@ -150,14 +160,6 @@ class ParticleCase:
             )
             for wall in self.wall
         ]
-
-    def smallest_radius(self, material: str) -> float:
-        """Of the drawn particles of a material [m]; infinite where none is drawn."""
-        least = math.inf
-        for table in self.particles:
-            if isinstance(table, (PackTable, StreamTable)) and table.material == material:
-                least = min(least, float(table.distribution.radii(1000).min()))
-        return least
 
 
 def _check_room(number: int, table: PackTable) -> None:

@@ -17,6 +17,8 @@ from greybed.core.wall_tables import (
     RectangleShape,
 )
 from greybed.core.walls import Mesh, Wall
+from greybed.dem.clump import Clump, sphere_union
+from greybed.dem.clump_shapes import fitted_clump, spherocylinder, tetrapod
 from greybed.dem.insertion import Region
 from greybed.dem.laws import COHESION, NORMAL, ROLLING
 from greybed.dem.materials import Contact, Material
@@ -161,6 +163,83 @@ WALLS = {
 
 
 @dataclass(frozen=True, kw_only=True)
+class _Shape:
+    """What every shape of particles has."""
+
+    name: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class TetrapodTable(_Shape):
+    """``[[shape]]`` with ``kind = "tetrapod"``."""
+
+    diameter: float = quantity("length", above=0.0)  # of each of the four spheres [m]
+    spacing: float = quantity("length", above=0.0)  # between their centres [m]
+
+    def clump(self) -> Clump:
+        """The shape itself."""
+        return tetrapod(self.diameter, self.spacing, name=self.name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpherocylinderTable(_Shape):
+    """``[[shape]]`` with ``kind = "spherocylinder"``."""
+
+    diameter: float = quantity("length", above=0.0)  # [m]
+    length: float = quantity("length", above=0.0)  # overall [m]
+    spheres: int = whole(5, at_least=2)
+
+    def clump(self) -> Clump:
+        """The shape itself."""
+        return spherocylinder(self.diameter, self.length, spheres=self.spheres, name=self.name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class UnionTable(_Shape):
+    """``[[shape]]`` with ``kind = "union"``: the spheres of a CSV table with units."""
+
+    file: Path  # relative to the case
+
+    def clump(self) -> Clump:
+        """The shape itself."""
+        from greybed.core.readers.assembling import Options
+        from greybed.core.readers.table import read
+
+        try:
+            data = self.file.read_bytes()
+        except OSError as error:
+            raise InputError(f"{self.file}: cannot read this table ({error.strerror}).") from None
+        spheres = read(self.file, data, Options())
+        return sphere_union(spheres.centres, spheres.radii, name=self.name)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScanTable(_Shape):
+    """``[[shape]]`` with ``kind = "scan"``: spheres fitted into a closed surface."""
+
+    file: Path  # STL, OBJ or PLY, relative to the case
+    unit: str = "m"  # of the file
+    spheres: int = whole(20, at_least=1)
+    bulge: float = quantity("dimensionless", 0.02, at_least=0.0, at_most=0.5)  # [-]
+
+    def clump(self) -> Clump:
+        """The shape itself."""
+        from greybed.core.readers.mesh import joined, read_mesh
+
+        mesh = joined(read_mesh(self.file, self.unit), self.name)
+        return fitted_clump(mesh, spheres=self.spheres, bulge=self.bulge, name=self.name)
+
+
+ShapeTable = TetrapodTable | SpherocylinderTable | UnionTable | ScanTable
+SHAPES = {
+    "tetrapod": TetrapodTable,
+    "spherocylinder": SpherocylinderTable,
+    "union": UnionTable,
+    "scan": ScanTable,
+}
+
+
+@dataclass(frozen=True, kw_only=True)
 class _Sourced:
     """What every table of particles has."""
 
@@ -171,20 +250,25 @@ class _Sourced:
 
 @dataclass(frozen=True, kw_only=True)
 class _Drawn(_Sourced):
-    """Particles of drawn sizes in a region."""
+    """Particles in a region, spheres of drawn sizes or clumps of one shape."""
 
-    sizes: str  # as of ``greybed pack --sizes``
+    sizes: str | None = None  # as of ``greybed pack --sizes``
+    shape: str | None = None  # name of a ``[[shape]]``
     lower: tuple[float, float, float] = vector("length")  # [m]
     upper: tuple[float, float, float] = vector("length")  # [m]
     round: bool = False
 
     def __post_init__(self) -> None:
-        parse_sizes(self.sizes)
+        if (self.sizes is None) == (self.shape is None):
+            raise InputError("give sizes of spheres or the name of a shape, one of the two.")
+        if self.sizes is not None:
+            parse_sizes(self.sizes)
         Region(self.lower, self.upper, self.round)
 
     @property
     def distribution(self) -> Sizes:
-        """Of the radii."""
+        """Of the radii of spheres."""
+        assert self.sizes is not None
         return parse_sizes(self.sizes)
 
     @property
@@ -274,3 +358,4 @@ class EffectsTable:
     rolling_resistance: bool = True
     cohesion: bool = True
     wall_friction: bool = True
+    particle_shape: bool = True  # off: spheres of the same volume

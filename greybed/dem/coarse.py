@@ -87,7 +87,7 @@ def coarse_case(case: ParticleCase) -> ParticleCase:
         return case
     particles: list[PackTable | StreamTable | FileTable] = []
     for number, table in enumerate(case.particles):
-        if isinstance(table, FileTable) or getattr(table, "shape", None) is not None:
+        if isinstance(table, FileTable) or table.sizes is None:
             what = "a file" if isinstance(table, FileTable) else "a shape"
             raise InputError(
                 f"particles[{number}]: coarse_graining = {factor:g} cannot enlarge particles of "

@@ -198,7 +198,13 @@ def solid_profile(
 
 
 def solid_field(
-    centres: ArrayLike, radii: ArrayLike, lower: ArrayLike, upper: ArrayLike, shape: ArrayLike
+    centres: ArrayLike,
+    radii: ArrayLike,
+    lower: ArrayLike,
+    upper: ArrayLike,
+    shape: ArrayLike,
+    *,
+    volumes: ArrayLike | None = None,
 ) -> Array:
     """Solid fraction in the cells of a grid, each sphere split over the cells that it reaches.
 
@@ -210,6 +216,8 @@ def solid_field(
         Corners of the grid [m].
     shape : three ints
         Cells along each axis, at least 1.
+    volumes : array_like, shape (n,), optional
+        Solid volume that each sphere stands for, where they overlap in clumps [m3].
 
     Returns
     -------
@@ -234,6 +242,8 @@ def solid_field(
     if cells.shape != (3,) or cells.min() < 1:
         raise InputError(f"shape = {cells.tolist()} must be three numbers, 1 at least.")
     points = _ball(512)
+    ball = 4.0 / 3.0 * math.pi * r**3
+    solids = ball if volumes is None else np.asarray(volumes, dtype=np.float64)
     solid = np.zeros(int(cells.prod()))
     for first in range(0, len(r), 4096):
         some = slice(first, first + 4096)
@@ -241,7 +251,7 @@ def solid_field(
         index = np.floor((place - low) / (high - low) * cells).astype(np.int64)
         inside = ((index >= 0) & (index < cells)).all(axis=2)
         flat = (index[..., 0] * cells[1] + index[..., 1]) * cells[2] + index[..., 2]
-        weight = np.repeat(4.0 / 3.0 * math.pi * r[some] ** 3 / len(points), len(points))
+        weight = np.repeat(solids[some] / len(points), len(points))
         solid += np.bincount(flat[inside], weight[inside.ravel()], len(solid))
     return (solid / ((high - low) / cells).prod()).reshape(tuple(cells))
 

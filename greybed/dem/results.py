@@ -29,7 +29,7 @@ def results_of(run: ParticleRun) -> dict[str, Any]:
     last = tally.history[-1]
     energy = sim.energies
     return {
-        "particles": 0 if run.emptied else len(sim.radii),
+        "particles": 0 if run.emptied else sim.count_of(),
         "emptied": run.emptied,
         "steps": sim.steps,
         "time_step_s": sim.time_step,
@@ -39,6 +39,16 @@ def results_of(run: ParticleRun) -> dict[str, Any]:
         "coordination": last["coordination [-]"],
         "kinetic_energy_J": energy.kinetic,
         "inserted": list(tally.inserted),
+        "shapes": {
+            name: {
+                "spheres": len(clump.radii),
+                "volume_m3": clump.volume,
+                "equivalent_radius_m": clump.equivalent_radius,
+                "reach_m": clump.reach,
+                **clump.shape_error,
+            }
+            for name, clump in run.feed.shapes.items()
+        },
         "bytes_per_particle": sim.bytes_per_particle,
         **({"heat": heat_results(case, run.heat, tally.history)} if run.heat else {}),
         "sinks": {
@@ -109,7 +119,10 @@ def _measure(run: ParticleRun, table: Any) -> dict[str, Any]:
     if isinstance(table, ConductionTable):
         assert run.heat is not None  # the case has been checked
         return conduction(table, sim, run.heat, run.tally.history)
-    field = measures.solid_field(x, r, table.lower, table.upper, (1, 1, 1))
+    density = np.array([material.density for material in sim.materials])[sim.kinds]
+    field = measures.solid_field(
+        x, r, table.lower, table.upper, (1, 1, 1), volumes=sim.masses / density
+    )
     inside = ((x > np.array(table.lower)) & (x < np.array(table.upper))).all(axis=1)
     return {
         "solid_fraction": float(field[0, 0, 0]),

@@ -20,9 +20,8 @@ from greybed.dem.case_heat import heat_of, sample_of, start_of
 from greybed.dem.case_tables import BoundsTable, FileTable, PackTable, StreamTable
 from greybed.dem.checkpoint import restore, save
 from greybed.dem.coarse import coarse_case
-from greybed.dem.insertion import random_places
+from greybed.dem.feeding import Feed
 from greybed.dem.measures import bed_height
-from greybed.dem.particles import rayleigh_time
 from greybed.dem.simulation import Simulation
 
 Array = NDArray[np.float64]
@@ -101,15 +100,29 @@ class ParticleRun:
         ordered = sorted(case.material, key=lambda m: m.name not in used)
         self._materials = [m.material for m in ordered]
         self._names = [m.name for m in ordered]
+        self.feed = Feed(
+            case, packings, self._materials,
+            self.tally.streamed, self.tally.inserted, self.tally.batches,
+        )  # fmt: skip
         step = case.time_step
         if step is None and case.law.normal == "hertz":
-            step = 0.1 * self._shortest(packings)
-        x, r, kind, v = self._start(packings)
+            step = 0.1 * self.feed.shortest_time()
+        batches = self.feed.at_start()
+        spheres = [batch for batch in batches if batch.shape is None]
+        x = np.concatenate([np.empty((0, 3)), *(batch.centres for batch in spheres)])
+        r = np.concatenate([np.empty(0), *(batch.radii for batch in spheres)])
+        kind = np.concatenate(
+            [np.empty(0, np.int64), *(np.full(len(b.radii), b.kind) for b in spheres)]
+        )
+        v = np.concatenate(
+            [np.empty((0, 3)), *(np.tile(b.velocity, (len(b.radii), 1)) for b in spheres)]
+        )
         periodic = case.periodic
         self.simulation = Simulation(
             x, r, self._materials, case.contacts(used), kinds=kind, kinds_to_come=len(used),
             law=case.contact_law, walls=case.walls, gravity=case.gravity, time_step=step,
-            velocities=v, most_overlap=case.most_overlap, threads=threads,
+            velocities=v, clumps=[batch.clumps for batch in batches if batch.shape is not None],
+            most_overlap=case.most_overlap, threads=threads,
             box=None if periodic is None else [periodic.lower, periodic.upper],
             periodic=(False,) * 3 if periodic is None
             else ("x" in periodic.axes, "y" in periodic.axes, "z" in periodic.axes),
@@ -126,80 +139,6 @@ class ParticleRun:
         self.heat = heat_of(case, self.simulation, self._names, counts)
         if not self.tally.history:
             self._note()
-
-    # -- start ------------------------------------------------------------------------------
-
-    def _shortest(self, packings: dict[int, Packing]) -> float:
-        """Rayleigh's time of the particle with the shortest one, of all that may come [s]."""
-        times = []
-        for number, table in enumerate(self.case.particles):
-            kind = self._names.index(table.material)
-            if isinstance(table, FileTable):
-                least = float(packings[number].radii.min())
-            else:
-                least = self.case.smallest_radius(table.material)
-            place = np.array([[0.0, 0.0, 0.0, least]])
-            times.append(rayleigh_time(place, np.array([kind]), self._materials))
-        return min(times)
-
-    def _start(self, packings: dict[int, Packing]) -> tuple[Array, Array, Any, Array]:
-        """Particles that are there at time 0."""
-        places: list[Array] = []
-        sizes: list[Array] = []
-        kinds: list[Any] = []
-        speeds: list[Array] = []
-        for number, table in enumerate(self.case.particles):
-            if isinstance(table, FileTable):
-                x, r = packings[number].centres, packings[number].radii
-            elif getattr(table, "at", getattr(table, "starts", 0.0)) == 0.0:
-                taken = (np.concatenate(places), np.concatenate(sizes)) if places else ((), ())
-                x, r = self._drawn(number, table, *taken)
-            else:
-                continue
-            places.append(x)
-            sizes.append(r)
-            kinds.append(np.full(len(x), self._names.index(table.material)))
-            speeds.append(np.broadcast_to(np.array(table.velocity), x.shape))
-        return (
-            np.concatenate(places), np.concatenate(sizes), np.concatenate(kinds),
-            np.concatenate(speeds),
-        )  # fmt: skip
-
-    def _drawn(
-        self, number: int, table: PackTable | StreamTable, taken: Any, taken_radii: Any
-    ) -> tuple[Array, Array]:
-        """New spheres of a table that find room now."""
-        tally, case = self.tally, self.case
-        seed = [case.seed, number, tally.batches[number]]
-        tally.batches[number] += 1
-        density = self._materials[self._names.index(table.material)].density
-        if isinstance(table, PackTable):
-            # Large ones first: small ones find room between them.
-            r = table.distribution.radii(table.count)[::-1]
-        else:
-            due = self._due(table) - tally.streamed[number]
-            if due <= 0.0 and tally.batches[number] > 1:
-                return np.empty((0, 3)), np.empty(0)
-            mean = float((table.distribution.radii(1000) ** 3).mean())
-            most = 1 + math.ceil(max(due, 0.0) / (density * 4.0 / 3.0 * math.pi * mean))
-            r = table.distribution.sampled(most, np.random.default_rng([*seed, 1]))
-            mass = np.cumsum(density * 4.0 / 3.0 * math.pi * r**3)
-            r = r[: max(1, int(np.searchsorted(mass, due)))]
-        x = random_places(table.region, r, seed, taken=taken, taken_radii=taken_radii)
-        if isinstance(table, PackTable) and len(x) < len(r):
-            raise InputError(
-                f"particles[{number}]: only {len(x)} of {len(r)} particles find room between "
-                f"{table.lower} and {table.upper} [m]; make the region larger, or insert fewer."
-            )
-        r = r[: len(x)]
-        tally.inserted[number] += len(x)
-        tally.streamed[number] += float((density * 4.0 / 3.0 * math.pi * r**3).sum())
-        return x, r
-
-    def _due(self, table: StreamTable) -> float:
-        """Mass that a stream owes by now [kg]."""
-        time = self.simulation.time if hasattr(self, "simulation") else 0.0
-        return min(table.rate * max(time - table.starts, 0.0), table.mass)
 
     # -- time -------------------------------------------------------------------------------
 
@@ -253,17 +192,10 @@ class ParticleRun:
         if step == 0:
             return
         for number, table in enumerate(case.particles):
-            owes = isinstance(table, StreamTable) and (
-                self._due(table) > self.tally.streamed[number] and sim.time >= table.starts
-            )
+            owes = isinstance(table, StreamTable) and self.feed.owes(number, table, sim.time)
             if owes or (isinstance(table, PackTable) and table.at > 0.0 and now(table.at)):
                 assert not isinstance(table, FileTable)
-                x, r = self._drawn(number, table, sim.centres, sim.radii)
-                if len(x):
-                    sim.insert(
-                        x, r, kinds=np.full(len(x), self._names.index(table.material)),
-                        velocities=np.broadcast_to(np.array(table.velocity), x.shape),
-                    )  # fmt: skip
+                self.feed.drawn(number, table, sim.centres, sim.radii, sim.time).enter(sim)
                 if self.heat is not None:
                     self.heat.arrive(start_of(case, number))
 
@@ -297,12 +229,12 @@ class ParticleRun:
     def _sink(self) -> None:
         sim = self.simulation
         for k, sink in enumerate(self.case.sink):
-            x = sim.centres
-            inside = ((x > np.array(sink.lower)) & (x < np.array(sink.upper))).all(axis=1)
+            x = sim.anchors
+            inside = np.all((x > np.array(sink.lower)) & (x < np.array(sink.upper)), axis=1)
             if not inside.any():
                 continue
             self.tally.sunk[k] += float(sim.masses[inside].sum())
-            self.tally.taken[k] += int(inside.sum())
+            self.tally.taken[k] += sim.count_of(inside)
             if inside.all():
                 # A simulation cannot be empty: the run is over, with these as they are.
                 self.emptied = True
@@ -314,7 +246,7 @@ class ParticleRun:
         sim, e = self.simulation, self.simulation.energies
         row = {
             "time [s]": sim.time,
-            "particles [-]": float(len(sim.radii)),
+            "particles [-]": float(sim.count_of()),
             "mass [kg]": float(sim.masses.sum()),
             "kinetic energy [J]": e.kinetic,
             "rotational energy [J]": e.rotational,
@@ -346,6 +278,8 @@ class ParticleRun:
         """Go back to a checkpoint; returns what else was given to :meth:`save`."""
         extra = restore(self.simulation, path)
         self.tally = Tally(**extra.pop("tally"))
+        self.feed.streamed, self.feed.inserted = self.tally.streamed, self.tally.inserted
+        self.feed.batches = self.tally.batches
         kept = extra.pop("heat", None)
         if self.heat is not None:
             self.heat.go_back(kept)

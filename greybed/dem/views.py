@@ -80,6 +80,12 @@ class Views:
         """Number of the body that a sphere belongs to, or -1, shape (n,)."""
         return self._in_order(self._state.body)
 
+    def count_of(self, which: NDArray[np.bool_] | None = None) -> int:
+        """Particles, of all or of those spheres: a body is one, whatever spheres it has."""
+        owner = self.body_of
+        chosen = owner if which is None else owner[which]
+        return int((chosen < 0).sum()) + len(np.unique(chosen[chosen >= 0]))
+
     @property
     def anchors(self) -> Array:
         """Centres of mass, shape (n, 3): of the body for spheres of one, else their own [m]."""
@@ -140,7 +146,7 @@ class Views:
     @property
     def coordination(self) -> float:
         """Contacts between particles, per particle [-]."""
-        return 2.0 * len(self.contacts) / len(self._state.place)
+        return 2.0 * len(self.contacts) / self.count_of()
 
     @property
     def bytes_per_particle(self) -> float:
