@@ -183,7 +183,8 @@ class ParticleRun:
             if now(wall.stops):
                 sim.move_wall(wall.name)
             elif wall.servo is not None and wall.starts <= sim.time < wall.stops:
-                self._servo(k)
+                # At looks only, not where a run was stopped, too: that must change no bit.
+                self._servo(k, step)
         if step % self.look:
             return
         self._sink()
@@ -199,12 +200,12 @@ class ParticleRun:
                 if self.heat is not None:
                     self.heat.arrive(start_of(case, number))
 
-    def _servo(self, k: int) -> None:
+    def _servo(self, k: int, step: int) -> None:
         """Turn a wall's speed towards where its force is the wanted one."""
         wall, tally = self.case.wall[k], self.tally
         assert wall.servo is not None
         speed = np.linalg.norm(wall.velocity)
-        if speed == 0.0:
+        if speed == 0.0 or step % self.look:
             return
         along = np.array(wall.velocity) / speed
         # What the particles push back with, over what is wanted.
