@@ -1,4 +1,4 @@
-"""Measures of bulk tests over time: shear over load in a shear box, slip on a plane that tilts."""
+"""Measures of bulk tests over time: masses in boxes, shear over load, slip on a tilting plane."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from greybed.dem.measure_tables import ShearTable, SlipTable
+from greybed.dem.measure_tables import ShearTable, SlipTable, SolidTable
 from greybed.dem.simulation import Simulation
 
 if TYPE_CHECKING:
@@ -17,10 +17,14 @@ if TYPE_CHECKING:
 History = Sequence[Mapping[str, float]]
 
 
-def slips(case: ParticleCase, simulation: Simulation) -> dict[str, float]:
-    """What a row of the history says of slip: tilt of each plane, mean speed along it."""
+def measured(case: ParticleCase, simulation: Simulation) -> dict[str, float]:
+    """What a row of the history says: masses in boxes, tilt of planes and mean speed along them."""
     row: dict[str, float] = {}
+    x, masses = simulation.centres, simulation.masses
     for table in case.measure:
+        if isinstance(table, SolidTable):
+            inside = ((x > np.array(table.lower)) & (x < np.array(table.upper))).all(axis=1)
+            row[f"mass in {table.name} [kg]"] = float(masses[inside].sum())
         if isinstance(table, SlipTable):
             tilt, speed = _slip(simulation, table.wall)
             row[f"tilt of {table.wall} [deg]"] = tilt
@@ -40,6 +44,19 @@ def _slip(simulation: Simulation, name: str) -> tuple[float, float]:
     up = -simulation.gravity / (np.linalg.norm(simulation.gravity) or 1.0)
     tilt = math.degrees(math.acos(float(np.clip(normal @ up, -1.0, 1.0))))
     return tilt, float(np.sqrt((along**2).sum(axis=1)).mean())
+
+
+def filling_rate(history: History, name: str) -> float | None:
+    """Mean rate into a box that was empty, from a tenth to 80 % of what it has at the end [kg/s].
+
+    None where it was not empty at the start, or fewer than three samples are in between.
+    """
+    total = np.array([row[f"mass in {name} [kg]"] for row in history])
+    inside = (total >= 0.1 * total[-1]) & (total <= 0.8 * total[-1])
+    if total[0] > 0.0 or not total[-1] > 0.0 or inside.sum() < 3:
+        return None
+    time = np.array([row["time [s]"] for row in history])
+    return float(np.polyfit(time[inside], total[inside], 1)[0])
 
 
 def slip_result(table: SlipTable, history: History) -> dict[str, Any]:

@@ -79,6 +79,11 @@ class ParticleCase:
             twice = sorted({name for name in names if names.count(name) > 1})
             if twice:
                 raise InputError(f"{what}: name {twice[0]!r} is used twice; give each its own.")
+        shared = {sink.name for sink in self.sink} & {table.name for table in self.measure}
+        if shared:
+            raise InputError(
+                f"a sink and a measure are both called {min(shared)!r}; give each its own name."
+            )
         known = [m.name for m in self.material]
         for part in (*self.particles, *self.wall):
             if part.material is not None and part.material not in known:

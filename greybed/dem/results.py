@@ -9,7 +9,7 @@ import numpy as np
 
 from greybed.core.errors import InputError
 from greybed.dem import measures
-from greybed.dem.bulk_tests import shear_result, slip_result
+from greybed.dem.bulk_tests import filling_rate, shear_result, slip_result
 from greybed.dem.case_heat import conduction, heat_results
 from greybed.dem.measure_tables import (
     CompartmentsTable,
@@ -128,4 +128,5 @@ def _measure(run: ParticleRun, table: Any) -> dict[str, Any]:
         "solid_fraction": float(field[0, 0, 0]),
         "mass_kg": float(sim.masses[inside].sum()),
         "particles": int(inside.sum()),
+        "mass_kg_per_s": filling_rate(run.tally.history, table.name),
     }

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from greybed.core.errors import InputError
 from greybed.core.packing import Packing
-from greybed.dem.bulk_tests import slips
+from greybed.dem.bulk_tests import measured
 from greybed.dem.case import ParticleCase
 from greybed.dem.case_heat import heat_of, sample_of, start_of
 from greybed.dem.case_tables import BoundsTable, FileTable, PackTable, StreamTable
@@ -263,7 +263,7 @@ class ParticleRun:
         for wall, force in zip(self.case.wall, sim.wall_forces, strict=True):
             for axis, value in zip("xyz", force, strict=True):
                 row[f"force {axis} on {wall.name} [N]"] = float(value)
-        row |= slips(self.case, sim)
+        row |= measured(self.case, sim)
         if self.heat is not None:
             row |= sample_of(self.case, self.heat)
         self.tally.history.append(row)

@@ -114,6 +114,34 @@ def test_an_open_mesh_may_be_meant(tmp_path):
     assert simulate(tmp_path, CASE.replace("#END", MESH + "open = true\n"))[0] == 0
 
 
+def test_frames_in_one_file_survive_a_stop(tmp_path, monkeypatch):
+    import h5py
+
+    text = CASE.replace("frames", 'format = "vtkhdf"\nframes')
+    original = ParticleRun.go_on
+
+    def stopped(self):
+        for done in original(self):
+            yield done
+            if self.simulation.time > 6e-3:
+                raise KeyboardInterrupt
+
+    monkeypatch.setattr(ParticleRun, "go_on", stopped)
+    code, out = simulate(tmp_path, text)
+    assert code == 130
+    assert len(list((out / "frames").glob("*.npz"))) == 2
+    monkeypatch.setattr(ParticleRun, "go_on", original)
+    assert simulate(tmp_path, text)[0] == 0
+    straight = ParticleRun(load_particle_case(tmp_path / "case.toml"), {})
+    with h5py.File(out / "frames.vtkhdf") as file:
+        times = file["VTKHDF/Steps/Values"][:]
+        points = file["VTKHDF/Points"][:].reshape(3, 20, 3)
+    for time, there in zip(times, points, strict=True):
+        for _ in straight.go_on(round(time / straight.simulation.time_step)):
+            pass
+        assert (straight.simulation.centres == there).all()
+
+
 def test_frames_of_an_older_case_go(tmp_path):
     text = CASE.replace("frames", 'format = "vtkhdf"\nframes')
     code, out = simulate(tmp_path, CASE)

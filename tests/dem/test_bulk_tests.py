@@ -12,7 +12,7 @@ from impacts import GLASS
 from greybed.core import InputError
 from greybed.core.config import build
 from greybed.dem import Contact, Simulation
-from greybed.dem.bulk_tests import shear_result
+from greybed.dem.bulk_tests import filling_rate, shear_result
 from greybed.dem.case import ParticleCase, load_particle_case
 from greybed.dem.coarse import coarse_case
 from greybed.dem.measure_tables import ShearTable
@@ -87,6 +87,15 @@ def test_spheres_slide_on_a_plane_at_the_angle_of_friction(friction):
     late = math.degrees(1.0) * math.sqrt(2.0 * 0.01 * math.cos(at) * math.radians(60.0) / 9.81)
     assert math.degrees(at) < found < math.degrees(at) + late + 60.0 * 4e-3
     assert run.tally.history[20]["slip on plate [m/s]"] < 1e-3
+
+
+def test_the_rate_into_an_empty_box():
+    rows = [
+        {"time [s]": t, "mass in low [kg]": float(np.clip(2.0 * (t - 1.0), 0.0, 4.0))}
+        for t in np.arange(0.0, 5.0, 0.05)
+    ]
+    assert filling_rate(rows, "low") == pytest.approx(2.0)
+    assert filling_rate(rows[30:], "low") is None  # there was some before
 
 
 def test_shear_over_load():
