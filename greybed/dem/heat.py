@@ -140,19 +140,29 @@ class Heat:
             self.advance(steps * self.simulation.time_step)
             self._steps = self.simulation.steps
 
-    def state(self) -> dict[str, Any]:
-        """What goes into a checkpoint, as JSON values that keep every bit."""
+    def state(self) -> dict[str, NDArray[Any]]:
+        """What goes beside a checkpoint."""
         return {
-            "steps": self._steps,
-            "by_label": self._by_label.tolist(),
-            "from_walls": self.from_walls.tolist(),
+            "heat_steps": np.array(self._steps),
+            "heat_by_label": self._by_label,
+            "heat_from_walls": self.from_walls,
         }
 
-    def go_back(self, state: Mapping[str, Any]) -> None:
-        """Take up what :meth:`state` has given."""
-        self._steps = int(state["steps"])
-        self._by_label = np.array(state["by_label"], dtype=np.float64)
-        self.from_walls = np.array(state["from_walls"], dtype=np.float64)
+    def go_back(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Take up what :meth:`state` has given.
+
+        Raises
+        ------
+        InputError
+            If it is not there.
+        """
+        try:
+            self._steps = int(state["heat_steps"])
+            self._by_label, self.from_walls = state["heat_by_label"], state["heat_from_walls"]
+        except KeyError:
+            raise InputError(
+                "this checkpoint holds no temperatures; give the case that wrote it."
+            ) from None
 
     def advance(self, time: float) -> None:
         """Let heat flow for a time through the contacts of now [s].

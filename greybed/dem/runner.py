@@ -273,7 +273,7 @@ class ParticleRun:
     def save(self, path: str | os.PathLike[str], **extra: Any) -> Path:
         """Write a checkpoint, with the tallies and what else is given."""
         heat = None if self.heat is None else self.heat.state()
-        return save(self.simulation, path, tally=vars(self.tally), heat=heat, **extra)
+        return save(self.simulation, path, beside=heat, tally=vars(self.tally), **extra)
 
     def restore(self, path: str | os.PathLike[str]) -> dict[str, Any]:
         """Go back to a checkpoint; returns what else was given to :meth:`save`."""
@@ -281,9 +281,9 @@ class ParticleRun:
         self.tally = Tally(**extra.pop("tally"))
         self.feed.streamed, self.feed.inserted = self.tally.streamed, self.tally.inserted
         self.feed.batches = self.tally.batches
-        kept = extra.pop("heat", None)
+        beside = extra.pop("beside", {})
         if self.heat is not None:
-            self.heat.go_back(kept)
+            self.heat.go_back(beside)
         return extra
 
 

@@ -124,6 +124,8 @@ def test_a_stopped_run_has_the_same_temperatures(tmp_path, whole):
     first.save(tmp_path / "half.npz")
     second = run_of(tmp_path, threads=1)
     second.restore(tmp_path / "half.npz")
+    with pytest.raises(InputError, match="holds no temperatures"):
+        second.heat.go_back({})
     ended(second)
     assert second.heat.temperatures.tobytes() == whole.heat.temperatures.tobytes()
     assert second.heat.from_walls.tobytes() == whole.heat.from_walls.tobytes()
