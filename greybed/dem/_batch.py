@@ -7,7 +7,7 @@ from numba import njit
 
 from greybed.dem import _columns as col
 from greybed.dem._cohesion import bridges, energy_density, jkr, pull_off, van_der_waals
-from greybed.dem._rolling import constant_torque, rolling_spring
+from greybed.dem._rolling import constant_torque, rolling_spring, viscous_torque
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
@@ -32,6 +32,8 @@ def solve(work, n, dt, normal, rolling, cohesion, limit):
         hertz(work, n)
     elif normal == col.LINEAR:
         linear(work, n)
+    elif normal == col.VISCOELASTIC:
+        viscoelastic(work, n)
     else:
         hysteresis(work, n)
     if limit and cohesion != col.JKR:
@@ -49,6 +51,8 @@ def solve(work, n, dt, normal, rolling, cohesion, limit):
     lever(work, n)
     if rolling == col.CONSTANT_TORQUE:
         constant_torque(work, n)
+    elif rolling == col.VISCOUS:
+        viscous_torque(work, n)
     elif rolling != col.NO_ROLLING:
         rolling_spring(work, n, dt, rolling == col.EPSD)
 
@@ -170,6 +174,37 @@ def hertz(work, n):
         k_t[c] = 8.0 * shear[c] * width
         k_n[c] = stiff * (2.0 / 3.0)
         force[c] = k_n[c] * overlap[c] - 2.0 * damping[c] * math.sqrt(stiff * m_eff[c]) * un[c]
+        viscous[c] = 2.0 * sideways[c] * math.sqrt(k_t[c] * m_eff[c])
+
+
+@njit(**_OPTIONS)
+def viscoelastic(work, n):
+    """Hertz's force with the dissipation 3/2 A k sqrt(d) v of a viscous material beside Tsuji's."""
+    r_eff, overlap, modulus, k_t, shear, k_n, relaxation = (
+        work[col.R_EFF],
+        work[col.OVERLAP],
+        work[col.LAW_MODULUS],
+        work[col.K_T],
+        work[col.LAW_SHEAR],
+        work[col.K_N],
+        work[col.LAW_UNLOADING],
+    )
+    force, damping, m_eff, un, viscous, sideways = (
+        work[col.FORCE],
+        work[col.LAW_DAMPING],
+        work[col.M_EFF],
+        work[col.UN],
+        work[col.DRAG],
+        work[col.LAW_SIDEWAYS],
+    )
+    for c in range(n):
+        width = math.sqrt(r_eff[c] * overlap[c])
+        stiff = 2.0 * modulus[c] * width
+        k_t[c] = 8.0 * shear[c] * width
+        k_n[c] = stiff * (2.0 / 3.0)
+        # The force of Hertz is 2/3 S d, so 3/2 A k sqrt(d) is A times S.
+        drag = 2.0 * damping[c] * math.sqrt(stiff * m_eff[c]) + relaxation[c] * stiff
+        force[c] = k_n[c] * overlap[c] - drag * un[c]
         viscous[c] = 2.0 * sideways[c] * math.sqrt(k_t[c] * m_eff[c])
 
 

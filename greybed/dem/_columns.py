@@ -1,8 +1,8 @@
 """Numbers of laws, and what stands in which column: material pairs, histories, batches."""
 
 # Normal laws, rolling resistance and cohesion; 0 is none where there may be none.
-LINEAR, HERTZ, HYSTERESIS = 0, 1, 2
-NO_ROLLING, CONSTANT_TORQUE, EPSD, EPSD_MODIFIED = 0, 1, 2, 3
+LINEAR, HERTZ, HYSTERESIS, VISCOELASTIC = 0, 1, 2, 3
+NO_ROLLING, CONSTANT_TORQUE, EPSD, EPSD_MODIFIED, VISCOUS = 0, 1, 2, 3, 4
 NO_COHESION, SJKR, DMT, VAN_DER_WAALS, JKR, LIQUID = 0, 1, 2, 3, 4, 5
 
 # Columns of the table of material pairs.
@@ -12,10 +12,10 @@ DAMPING = 2  # share of critical damping, in the units of each law [-]
 TANGENTIAL_DAMPING = 3  # the same for tangential motion [-]
 FRICTION = 4  # static friction [-]
 SLIDING = 5  # dynamic friction [-]
-ROLLING = 6  # rolling friction [-]
+ROLLING = 6  # rolling friction [-]; time of viscous rolling [s]
 ROLLING_DAMPING = 7  # share of critical rolling damping [-]
 COHESION = 8  # energy density [J/m3], surface energy [J/m2], Hamaker constant [J] or tension [N/m]
-UNLOADING = 9  # unloading over loading stiffness of the hysteretic law [-]
+UNLOADING = 9  # unloading over loading stiffness (hysteresis) [-]; relaxation (viscoelastic) [s]
 COLUMNS = 12
 NEAREST = 10  # gap below which van der Waals forces no longer grow [m]; volume of a bridge [m3]
 REACH = 11  # gap beyond which cohesion ends [m]

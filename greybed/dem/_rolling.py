@@ -55,6 +55,33 @@ def constant_torque(work, n):
 
 
 @njit(**_OPTIONS)
+def viscous_torque(work, n):
+    """A torque in proportion to the normal force and the rolling velocity R* |difference of spins|.
+
+    The pressure cannot lie outside the contact, so the torque ends at force times its radius.
+    """
+    roll_rate(work, n)
+    rx, ry, rz, time, force, r_eff, overlap = (
+        work[col.RX],
+        work[col.RY],
+        work[col.RZ],
+        work[col.LAW_ROLLING],
+        work[col.FORCE],
+        work[col.R_EFF],
+        work[col.OVERLAP],
+    )
+    for c in range(n):
+        speed = r_eff[c] * math.sqrt(rx[c] * rx[c] + ry[c] * ry[c] + rz[c] * rz[c])
+        radius = math.sqrt(r_eff[c] * max(overlap[c], 0.0))
+        lag = time[c] * speed
+        share = radius / lag if lag > radius else 1.0
+        size = abs(force[c]) * time[c] * r_eff[c] * share
+        rx[c] *= size
+        ry[c] *= size
+        rz[c] *= size
+
+
+@njit(**_OPTIONS)
 def rolling_spring(work, n, dt, dashpot):
     """EPSD: a spring that yields, with a dashpot until then; or the modified one, without."""
     roll_rate(work, n)

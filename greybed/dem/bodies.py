@@ -139,8 +139,19 @@ def chosen_bodies(rigid: Rigid, stays: NDArray[np.bool_]) -> Rigid:
     )  # fmt: skip
 
 
+def sorted_bodies(rigid: Rigid, order: Index) -> Rigid:
+    """Bodies in another order, ``order[new] = old``."""
+    sizes = np.diff(rigid.first)[order]
+    first = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+    spheres = np.arange(first[-1]) + np.repeat(rigid.first[order] - first[:-1], sizes)
+    return Rigid(
+        rigid.pose[order], rigid.swing[order], rigid.bulk[order], first,
+        rigid.member[spheres], rigid.offset[spheres], rigid.image[spheres],
+    )  # fmt: skip
+
+
 def shown(rigid: Rigid) -> Bodies:
-    """Copies of what bodies are and do."""
+    """What bodies are and do."""
     turn = turns(rigid.pose[:, 3:])
     momenta = rigid.swing[:, 3:]
     moments = rigid.bulk[:, 1:]

@@ -133,7 +133,7 @@ class ParticleCase:
         """The law, less the effects that are off."""
         law, on = self.law, self.effects
         return ContactLaw(
-            law.normal,
+            law.normal if law.normal != "viscoelastic" or on.velocity_restitution else "hertz",
             law.rolling if on.rolling_resistance else "none",
             law.cohesion if on.cohesion else "none",
             law.limit_force,

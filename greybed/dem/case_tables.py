@@ -73,6 +73,11 @@ class ContactTable:
     contact_angle: float = quantity("angle", 0.0, at_least=0.0)  # [rad]
     stiffness: float | None = quantity("stiffness", None, above=0.0)  # [N/m]
     tangential_ratio: float = quantity("dimensionless", 2.0 / 7.0, above=0.0)  # [-]
+    rolling_time: float = quantity("time", 0.0, at_least=0.0)  # of viscous rolling [s]
+    # The impact that restitution is of, and what the slowest ones return (viscoelastic).
+    reference_speed: float | None = quantity("velocity", None, above=0.0)  # [m/s]
+    reference_radius: float | None = quantity("length", None, above=0.0)  # [m]
+    slow_restitution: float = quantity("dimensionless", 1.0, above=0.0, at_most=1.0)  # [-]
 
     def __post_init__(self) -> None:
         if len(self.between) != 2:
@@ -359,3 +364,4 @@ class EffectsTable:
     cohesion: bool = True
     wall_friction: bool = True
     particle_shape: bool = True  # off: spheres of the same volume
+    velocity_restitution: bool = True  # off: restitution is that of the reference impact

@@ -68,7 +68,8 @@ def save(
     }
     with atomic_path(path) as part, open(part, "wb") as stream:
         np.savez(
-            stream, allow_pickle=False, ident=lists.ident, labels=simulation.labels,
+            stream, allow_pickle=False, ident=lists.ident, body_ident=lists.body_ident,
+            labels=simulation.labels,
             worst=lists.worst, count=lists.count, numbers=np.array(json.dumps(numbers)), **arrays,
         )  # fmt: skip
     return Path(path)
@@ -120,7 +121,7 @@ def restore(simulation: Simulation, path: str | os.PathLike[str]) -> dict[str, A
         )
     lists: Lists = simulation._lists
     lists.state, lists.near, lists.surfaces = groups["state"], groups["near"], groups["surfaces"]
-    lists.rigid = groups["rigid"]
+    lists.rigid, lists.body_ident = groups["rigid"], arrays["body_ident"]
     lists.ident, lists.worst, lists.count = arrays["ident"], arrays["worst"], arrays["count"]
     lists.wall_way, lists.skin = float(numbers["wall_way"]), float(numbers["skin"])
     lists.wall_pace = lists.pace()

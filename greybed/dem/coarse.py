@@ -13,6 +13,7 @@ energy density (SJKR) [J/m3]        the same: the disc of the contact grows by f
 surface energy (DMT, JKR) [J/m2]    times f
 surface tension (bridges) [N/m]     times f; volume of a bridge times f^3
 Hamaker constant [J]                times f^3, with both gaps times f
+times of viscous materials [s]      times f (rolling; of impacts by the reference radius)
 ==================================  =====================================================
 
 A collision at the same speed is then the same in units of radius, mass and R / speed: it lasts f
@@ -63,6 +64,7 @@ def coarse_grained(contact: Contact, law: ContactLaw, factor: float) -> Contact:
         For a factor below 1, or a law of cohesion that no rule is known for.
     """
     _check(factor, law.cohesion)
+    radius = contact.reference_radius
     return replace(
         contact,
         stiffness=None if contact.stiffness is None else factor * contact.stiffness,
@@ -70,6 +72,9 @@ def coarse_grained(contact: Contact, law: ContactLaw, factor: float) -> Contact:
         nearest=factor * contact.nearest,
         reach=factor * contact.reach,
         bridge_volume=factor**3 * contact.bridge_volume,
+        rolling_time=factor * contact.rolling_time,
+        # The viscoelastic law finds its time from the impact of a sphere of this radius.
+        reference_radius=None if radius is None else factor * radius,
     )
 
 

@@ -11,12 +11,14 @@ NORMAL = {
     "linear": _columns.LINEAR,
     "hertz": _columns.HERTZ,
     "hysteresis": _columns.HYSTERESIS,
+    "viscoelastic": _columns.VISCOELASTIC,
 }
 ROLLING = {
     "none": _columns.NO_ROLLING,
     "constant-torque": _columns.CONSTANT_TORQUE,
     "epsd": _columns.EPSD,
     "epsd-modified": _columns.EPSD_MODIFIED,
+    "viscous": _columns.VISCOUS,
 }
 COHESION = {
     "none": _columns.NO_COHESION,
@@ -34,15 +36,19 @@ class ContactLaw:
 
     Attributes
     ----------
-    normal : {"hertz", "linear", "hysteresis"}
+    normal : {"hertz", "linear", "hysteresis", "viscoelastic"}
         ``hertz``: :math:`F = \tfrac43 E^* \sqrt{R^*}\,\delta^{3/2}` with the damping of Tsuji et
         al. 1992 [1]_, tangential stiffness :math:`8 G^* \sqrt{R^*\delta}` (Mindlin's limit
         without slip). ``linear``: spring and dashpot [2]_. ``hysteresis``: loading with k,
-        unloading with k / e^2 down to the plastic overlap [3]_.
-    rolling : {"none", "constant-torque", "epsd", "epsd-modified"}
+        unloading with k / e^2 down to the plastic overlap [3]_. ``viscoelastic``: Hertz with the
+        dissipation :math:`2 A E^* \sqrt{R^*\delta}\,\dot\delta` of a viscous material [11]_:
+        the faster the impact, the less comes back.
+    rolling : {"none", "constant-torque", "epsd", "epsd-modified", "viscous"}
         Constant directional torque :math:`\mu_r R^* F`; elastic-plastic spring and dashpot with
         :math:`k_r = 2.25 k_n (\mu_r R^*)^2`; the same without dashpot and with
-        :math:`k_r = k_t R^{*2}` [4]_, [5]_.
+        :math:`k_r = k_t R^{*2}` [4]_, [5]_; the torque :math:`\tau F v` of a viscous material that
+        rolls with velocity :math:`v = R^* |\omega_i - \omega_j|`, at most F times the radius of
+        the contact [12]_.
     cohesion : {"none", "sjkr", "dmt", "van-der-waals", "jkr", "liquid-bridge"}
         Energy density times the disc of the contact; constant pull-off force
         :math:`4\pi\gamma R^*` [6]_; Hamaker's force :math:`A R^*/(6 h^2)` across gaps [7]_; a neck
@@ -69,6 +75,8 @@ class ContactLaw:
     .. [8] Johnson, Kendall & Roberts, Proc. R. Soc. A 324 (1971) 301, doi 10.1098/rspa.1971.0141.
     .. [9] Willett, Adams, Johnson & Seville, Langmuir 16 (2000) 9396, doi 10.1021/la000657y.
     .. [10] Lian, Thornton & Adams, J. Colloid Interface Sci. 161 (1993) 138.
+    .. [11] Brilliantov, Spahn, Hertzsch & Poeschel, Phys. Rev. E 53 (1996) 5382.
+    .. [12] Brilliantov & Poeschel, Europhys. Lett. 42 (1998) 511, doi 10.1209/epl/i1998-00281-7.
     """
 
     normal: str = "hertz"
@@ -86,6 +94,11 @@ class ContactLaw:
 
         if self.cohesion == "jkr" and self.normal != "hertz":
             raise InputError(f"cohesion = 'jkr' needs normal = 'hertz', not {self.normal!r}.")
+
+    @property
+    def from_moduli(self) -> bool:
+        """Whether stiffness comes from the moduli of the materials, as Hertz has it."""
+        return self.normal in ("hertz", "viscoelastic")
 
     @property
     def columns(self) -> int:

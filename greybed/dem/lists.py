@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from greybed.core.errors import InputError
 from greybed.dem import _neighbours, _rigid, _step, _walls
-from greybed.dem.bodies import chosen_bodies, joined_bodies, joined_states
+from greybed.dem.bodies import chosen_bodies, joined_bodies, joined_states, sorted_bodies
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -29,6 +29,8 @@ class Lists:
         Particles, sorted by place at each :meth:`renew`.
     ident : (n,) int array
         Numbers of the input in this order.
+    body_ident : (b,) int array
+        The same of the bodies.
     near, surfaces
         Lists for the compiled steps.
     rigid : Rigid
@@ -53,7 +55,7 @@ class Lists:
     ) -> None:
         n = len(state.place)
         self.state, self.rigid = state, rigid
-        self.ident = np.arange(n)
+        self.ident, self.body_ident = np.arange(n), np.arange(len(rigid.pose))
         self.skin, self.reach, self.columns = skin, reach, columns
         self.periodic = np.array(periodic, dtype=bool)
         self.wraps = bool(self.periodic.any())
@@ -94,6 +96,8 @@ class Lists:
         m = len(more.place)
         self.ident = np.concatenate([self.ident, np.arange(m) + len(self.ident)])
         self.state = joined_states([self.state, more])
+        b, m = len(self.rigid.pose), len(bodies.pose)
+        self.body_ident = np.concatenate([self.body_ident, np.arange(m) + b])
         self.rigid = joined_bodies([self.rigid, bodies])
         near, surfaces = self.near, self.surfaces
         self.near = near._replace(
@@ -199,10 +203,15 @@ class Lists:
         rigid = self.rigid._replace(member=now[self.rigid.member])
         stays = rigid.member[rigid.first[:-1]] >= 0
         if not stays.all():
-            rigid = chosen_bodies(rigid, stays)
-            number = np.cumsum(stays) - 1
-            body = self.state.body
-            self.state = self.state._replace(body=np.where(body >= 0, number[body], -1))
+            rigid, left = chosen_bodies(rigid, stays), self.body_ident[stays]
+            self.body_ident = np.argsort(np.argsort(left, kind="stable"), kind="stable")
+        # By place, too: a body's spheres are then near the last one's in memory.
+        by_place = np.argsort(rigid.member[rigid.first[:-1]], kind="stable")
+        rigid = sorted_bodies(rigid, by_place)
+        self.body_ident = self.body_ident[by_place]
+        body = np.full(len(order), -1)
+        body[rigid.member] = np.repeat(np.arange(len(rigid.pose)), np.diff(rigid.first))
+        self.state = self.state._replace(body=body)
         if self.wraps and len(rigid.pose):
             _neighbours.wrap(rigid.pose, self.box[0], self.edge, self.periodic)
             _rigid.images_of(rigid, self.state.place, self.edge)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from greybed.core.errors import InputError
 from greybed.dem import _columns
-from greybed.dem.damping import damping
+from greybed.dem.damping import damping, relaxation
 from greybed.dem.laws import ContactLaw
 
 Array = NDArray[np.float64]
@@ -65,13 +65,18 @@ class Contact:
     Attributes
     ----------
     restitution : float
-        Speed after over speed before a collision along the normal, above 0, at most 1 [-].
+        Speed after over speed before a collision along the normal, above 0, at most 1 [-]. Where
+        it depends on the speed (``viscoelastic``): of the reference impact.
     friction, sliding_friction : float
         Static and dynamic, at least 0 [-]; the dynamic one is the static one by default.
     rolling_friction : float
         At least 0 [-].
     rolling_damping : float
         Share of critical damping while the rolling spring holds (EPSD), 0 to 1 [-].
+    rolling_time : float
+        Of viscous rolling, at least 0 [s]: torque over normal force and rolling velocity. Theory
+        has the relaxation time of the material; it holds while the sphere rolls by much less than
+        the radius of the contact in that time.
     cohesion : float
         At least 0: energy density [J/m3] (SJKR), surface energy [J/m2] (DMT, JKR), Hamaker
         constant [J] (van der Waals) or surface tension [N/m] (liquid bridges).
@@ -81,6 +86,12 @@ class Contact:
         Of liquid bridges: volume of each [m3], and angle of liquid and solid, 0 to pi/2 [rad].
     stiffness, tangential_ratio : float
         Of linear and hysteretic laws: normal stiffness [N/m], and tangential over normal [-].
+    reference_speed, reference_radius : float
+        Of the viscoelastic law: approach speed [m/s] of two spheres of this radius [m] that return
+        ``restitution``; where one of the materials is of walls only, of such a sphere and a wall.
+    slow_restitution : float
+        What the slowest impacts return by the viscoelastic law, from ``restitution`` to 1 [-]; 1,
+        the default, is a body that loses by its viscosity alone.
     """
 
     restitution: float
@@ -95,6 +106,10 @@ class Contact:
     contact_angle: float = 0.0
     stiffness: float | None = None
     tangential_ratio: float = 2.0 / 7.0
+    rolling_time: float = 0.0
+    reference_speed: float | None = None
+    reference_radius: float | None = None
+    slow_restitution: float = 1.0
 
     def __post_init__(self) -> None:
         if not 0.0 < self.restitution <= 1.0:
@@ -115,8 +130,24 @@ class Contact:
         InputError
             If a number is missing.
         """
-        if law.normal != "hertz" and not self.stiffness:
+        if not law.from_moduli and not self.stiffness:
             raise InputError(f"{who}: the {law.normal} law needs stiffness [N/m] above 0; give it.")
+        if law.normal == "viscoelastic":
+            if not (self.reference_speed and self.reference_radius):
+                raise InputError(
+                    f"{who}: the viscoelastic law needs reference_speed [m/s] and reference_radius "
+                    "[m] above 0, at which restitution was measured; give both."
+                )
+            if not self.restitution <= self.slow_restitution <= 1.0:
+                raise InputError(
+                    f"{who}: slow_restitution = {self.slow_restitution:g} [-] must lie between "
+                    f"restitution = {self.restitution:g} and 1: faster impacts lose more."
+                )
+        if law.rolling == "viscous" and self.rolling_friction > 0.0 == self.rolling_time:
+            raise InputError(
+                f"{who}: viscous rolling takes rolling_time [s], not rolling_friction = "
+                f"{self.rolling_friction:g} [-]; give the time."
+            )
         if law.cohesion == "van-der-waals" and not 0.0 < self.nearest < self.reach:
             raise InputError(
                 f"{who}: van der Waals cohesion needs 0 < nearest < reach [m], not "
@@ -190,13 +221,14 @@ def pair_tables(
                     "friction of this pair."
                 )
             row[i, j] = row[j, i] = len(rows)
-            rows.append(_row(a, b, contact.checked(law, f"{a.name!r} and {b.name!r}"), law))
+            checked = contact.checked(law, f"{a.name!r} and {b.name!r}")
+            rows.append(_row(a, b, checked, law, of_wall=j >= particles))
     return row, np.array(rows)
 
 
-def _row(a: Material, b: Material, contact: Contact, law: ContactLaw) -> Array:
+def _row(a: Material, b: Material, contact: Contact, law: ContactLaw, *, of_wall: bool) -> Array:
     row = np.zeros(_columns.COLUMNS)
-    if law.normal == "hertz":
+    if law.from_moduli:
         row[_columns.MODULUS] = 1.0 / sum(
             (1.0 - m.poissons_ratio**2) / m.youngs_modulus for m in (a, b)
         )
@@ -207,14 +239,22 @@ def _row(a: Material, b: Material, contact: Contact, law: ContactLaw) -> Array:
         row[_columns.SHEAR] = contact.stiffness * contact.tangential_ratio
     e = contact.restitution
     if law.normal != "hysteresis":
-        row[_columns.DAMPING] = damping(e, law.normal, limit_force=law.limit_force)
+        shape = "hertz" if law.from_moduli else "linear"
+        row[_columns.DAMPING] = damping(e, shape, limit_force=law.limit_force)
         if law.tangential_damping:
             row[_columns.TANGENTIAL_DAMPING] = row[_columns.DAMPING]
     row[_columns.UNLOADING] = 1.0 / e**2
+    if law.normal == "viscoelastic":
+        slow = contact.slow_restitution
+        row[_columns.DAMPING] = damping(slow, "hertz", limit_force=law.limit_force)
+        modulus = float(row[_columns.MODULUS])
+        row[_columns.UNLOADING] = _relaxation_time(a, b, contact, law, modulus, of_wall)
     sliding = contact.sliding_friction
     row[_columns.FRICTION] = contact.friction
     row[_columns.SLIDING] = contact.friction if sliding is None else sliding
     row[_columns.ROLLING] = contact.rolling_friction
+    if law.rolling == "viscous":
+        row[_columns.ROLLING] = contact.rolling_time
     row[_columns.ROLLING_DAMPING] = contact.rolling_damping
     row[_columns.COHESION] = contact.cohesion
     row[_columns.NEAREST] = contact.nearest
@@ -224,3 +264,18 @@ def _row(a: Material, b: Material, contact: Contact, law: ContactLaw) -> Array:
         row[_columns.NEAREST] = max(contact.bridge_volume, 1e-300)
         row[_columns.REACH] = (1.0 + 0.5 * contact.contact_angle) * math.cbrt(contact.bridge_volume)
     return row
+
+
+def _relaxation_time(
+    a: Material, b: Material, contact: Contact, law: ContactLaw, modulus: float, of_wall: bool
+) -> float:
+    """Time by which the material lags, from the reference impact [s]."""
+    speed, radius = contact.reference_speed, contact.reference_radius
+    assert speed is not None
+    assert radius is not None
+    first, second = (4.0 / 3.0 * math.pi * radius**3 * m.density for m in (a, b))
+    mass = first if of_wall else first * second / (first + second)
+    stiff = 4.0 / 3.0 * modulus * math.sqrt(radius if of_wall else 0.5 * radius)
+    number = relaxation(contact.restitution, contact.slow_restitution, limit_force=law.limit_force)
+    # In units of the time that the speed takes for the length of the impact.
+    return number * float((mass * speed**2 / stiff) ** 0.4) / speed

@@ -20,6 +20,8 @@ class PileTable:
     below: float = quantity("length", 1e30)  # and below this one [m]
     lower: float = quantity("length", -1e30)  # and between these two along the axis [m]
     upper: float = quantity("length", 1e30)
+    # The mean angle over the samples of this time before the end; of the end only by default [s].
+    average: float | None = quantity("time", None, above=0.0)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -92,7 +92,7 @@ class Population(Views):
                 "later only if kinds_to_come said so."
             )
         shortest = rayleigh_time(place, kind, self.materials)
-        if self.law.normal == "hertz" and self.time_step > MOST_OF_RAYLEIGH * shortest:
+        if self.law.from_moduli and self.time_step > MOST_OF_RAYLEIGH * shortest:
             raise InputError(
                 f"time_step = {self.time_step:g} [s] exceeds {MOST_OF_RAYLEIGH:g} of Rayleigh's "
                 f"time {shortest:.3g} [s] of the particles to be inserted; take a smaller one."

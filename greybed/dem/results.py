@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from greybed.core.errors import InputError
 from greybed.dem import measures
 from greybed.dem.bulk_tests import filling_rate, shear_result, slip_result
 from greybed.dem.case_heat import conduction, heat_results
@@ -20,6 +19,7 @@ from greybed.dem.measure_tables import (
     StressTable,
 )
 from greybed.dem.runner import ParticleRun
+from greybed.dem.slopes import mean_slope, slope_now
 from greybed.dem.stress import stress_in
 
 
@@ -81,23 +81,7 @@ def _measure(run: ParticleRun, table: Any) -> dict[str, Any]:
     sim = run.simulation
     x, r = sim.centres, sim.radii
     if isinstance(table, PileTable):
-        chosen = (x[:, 2] > table.above) & (x[:, 2] < table.below)
-        axis = {"heap": None, "x": 0, "y": 1}[table.axis]
-        if axis is not None:
-            chosen &= (x[:, axis] > table.lower) & (x[:, axis] < table.upper)
-        if not chosen.any():
-            return {"angle_deg": None, "why": "no particle is there"}
-        profile = measures.pile_profile(x[chosen], r[chosen], table.width, axis=axis)
-        known = np.isfinite(profile.height)
-        found: dict[str, Any] = {
-            "position_m": profile.position[known].tolist(),
-            "height_m": profile.height[known].tolist(),
-        }
-        try:
-            angle, error = profile.slope()
-        except InputError as refusal:
-            return {**found, "angle_deg": None, "why": str(refusal)}
-        return {**found, "angle_deg": angle, "angle_stderr_deg": error}
+        return {**slope_now(sim, table), **mean_slope(table, run.tally.history)}
     if isinstance(table, CompartmentsTable):
         edges = np.linspace(table.lower, table.upper, table.count + 1)
         shares, intensity = measures.segregation(

@@ -23,6 +23,7 @@ from greybed.dem.coarse import coarse_case
 from greybed.dem.feeding import Feed
 from greybed.dem.measures import bed_height
 from greybed.dem.simulation import Simulation
+from greybed.dem.slopes import slopes
 
 Array = NDArray[np.float64]
 
@@ -105,7 +106,7 @@ class ParticleRun:
             self.tally.streamed, self.tally.inserted, self.tally.batches,
         )  # fmt: skip
         step = case.time_step
-        if step is None and case.law.normal == "hertz":
+        if step is None and case.contact_law.from_moduli:
             step = 0.1 * self.feed.shortest_time()
         batches = self.feed.at_start()
         spheres = [batch for batch in batches if batch.shape is None]
@@ -263,6 +264,7 @@ class ParticleRun:
         for wall, force in zip(self.case.wall, sim.wall_forces, strict=True):
             for axis, value in zip("xyz", force, strict=True):
                 row[f"force {axis} on {wall.name} [N]"] = float(value)
+        row |= slopes(self.case, sim)
         row |= measured(self.case, sim)
         if self.heat is not None:
             row |= sample_of(self.case, self.heat)

@@ -241,7 +241,7 @@ class Simulation(Population):
 
     def _checked_step(self, time_step: float | None) -> float:
         if time_step is None:
-            if self.law.normal != "hertz":
+            if not self.law.from_moduli:
                 raise InputError(
                     f"the {self.law.normal} law needs time_step [s]: a thirtieth of "
                     "pi sqrt(m / stiffness) of the lightest pair."
@@ -249,7 +249,7 @@ class Simulation(Population):
             return 0.1 * self._rayleigh
         if not (time_step > 0.0 and math.isfinite(time_step)):
             raise InputError(f"time_step = {time_step:g} [s] must be finite and above 0.")
-        if self.law.normal == "hertz" and time_step > MOST_OF_RAYLEIGH * self._rayleigh:
+        if self.law.from_moduli and time_step > MOST_OF_RAYLEIGH * self._rayleigh:
             raise InputError(
                 f"time_step = {time_step:g} [s] exceeds {MOST_OF_RAYLEIGH:g} of Rayleigh's time "
                 f"{self._rayleigh:.3g} [s]; take at most {MOST_OF_RAYLEIGH * self._rayleigh:.3g}, "

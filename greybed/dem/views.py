@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from greybed.dem import _columns, _step
-from greybed.dem.bodies import Bodies, shown, turns
+from greybed.dem.bodies import Bodies, shown, sorted_bodies, turns
 from greybed.dem.lists import Lists
 from greybed.dem.particles import Energies
 
@@ -73,12 +73,16 @@ class Views:
     @property
     def bodies(self) -> Bodies:
         """Rigid bodies, in the order of the input."""
-        return shown(self._lists.rigid)
+        rigid = self._lists.rigid
+        return shown(sorted_bodies(rigid, np.argsort(self._lists.body_ident)))
 
     @property
     def body_of(self) -> Index:
         """Number of the body that a sphere belongs to, or -1, shape (n,)."""
-        return self._in_order(self._state.body)
+        body = self._state.body
+        # One more, for -1: that of spheres without a body.
+        number = np.append(self._lists.body_ident, -1)
+        return self._in_order(number[body])
 
     def count_of(self, which: NDArray[np.bool_] | None = None) -> int:
         """Particles, of all or of those spheres: a body is one, whatever spheres it has."""

@@ -1,9 +1,8 @@
-"""Measures of stress in boxes, of a shear box and of slip; the examples load."""
+"""Measures of stress in boxes, of a shear box, of slip on a plane."""
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,14 +12,11 @@ from greybed.core import InputError
 from greybed.core.config import build
 from greybed.dem import Contact, Simulation
 from greybed.dem.bulk_tests import filling_rate, shear_result
-from greybed.dem.case import ParticleCase, load_particle_case
-from greybed.dem.coarse import coarse_case
+from greybed.dem.case import ParticleCase
 from greybed.dem.measure_tables import ShearTable
 from greybed.dem.results import results_of
 from greybed.dem.runner import ParticleRun
 from greybed.dem.stress import stress, stress_in
-
-EXAMPLES = Path(__file__).parents[2] / "examples" / "particles"
 
 
 def test_boxes_share_out_the_stress_of_the_whole():
@@ -112,10 +108,3 @@ def test_shear_over_load():
     late = 0.5 + 0.1 * 4 / 15  # of the 15 late samples four are before 2.9 s
     assert found["residual"] == pytest.approx(late, abs=0.01)
     assert shear_result(table, rows[:5])["residual"] is None
-
-
-@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.toml")), ids=lambda path: path.stem)
-def test_examples_are_valid(path):
-    case = load_particle_case(path)
-    assert case.contacts({table.material for table in case.particles})
-    assert coarse_case(case) is case

@@ -266,3 +266,23 @@ def test_effects_are_switches(tmp_path):
     contacts = slick.contacts({"glass"})
     assert contacts["glass", "steel"].friction == 0.0
     assert contacts["glass", "glass"].friction == 0.3
+
+
+def test_an_effect_that_is_off_leaves_the_reference_restitution(tmp_path):
+    """The viscoelastic law off is Hertz's with the restitution of the reference impact."""
+    viscous = SILO.replace("[output]", '[law]\nnormal = "viscoelastic"\n[output]').replace(
+        "restitution = 0.5", 'restitution = 0.5\nreference_speed = 1\nreference_radius = "1.2 mm"'
+    )
+    plain = ParticleRun(case_of(tmp_path, SILO), {}, threads=1)
+    off = viscous + "[effects]\nvelocity_restitution = false\n"
+    ends = {}
+    for name, text in (("on", viscous), ("off", off)):
+        run = ParticleRun(case_of(tmp_path, text), {}, threads=1)
+        assert run.simulation.time_step == plain.simulation.time_step
+        for _ in run.go_on(2_000):
+            pass
+        ends[name] = run.simulation.centres
+    for _ in plain.go_on(2_000):
+        pass
+    np.testing.assert_array_equal(ends["off"], plain.simulation.centres)
+    assert np.abs(ends["on"] - ends["off"]).max() > 1e-6

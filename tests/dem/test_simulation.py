@@ -41,6 +41,35 @@ def test_an_elastic_gas_keeps_energy_and_momentum():
     assert abs(sim.masses @ sim.velocities - momentum).max() < 1e-13 * scale
 
 
+def test_a_million_steps_of_an_elastic_gas_keep_its_energy():
+    sim = gas(4, time_step=1e-6, threads=1)
+    edge, modulus = 4 * 2.6 * R, 0.5 * 5e6 / (1 - 0.3**2)
+
+    def energy():
+        """Of motion, and what Hertz's springs store: 8/15 E* sqrt(R*) d^(5/2)."""
+        i, j = sim.contacts.T
+        apart = sim.centres[i] - sim.centres[j]
+        apart -= edge * np.round(apart / edge)
+        overlap = 2 * R - np.linalg.norm(apart, axis=1)
+        return sim.energies.kinetic + (8 / 15 * modulus * np.sqrt(R / 2) * overlap**2.5).sum()
+
+    before, momentum = energy(), sim.masses @ sim.velocities
+    met, touching, off = 0, set(), []
+    for look in range(10_000):
+        sim.run(100)
+        now = set(map(tuple, sim.contacts.tolist()))
+        met += len(now - touching)
+        touching = now
+        if look % 100 == 99:
+            off.append(energy() / before - 1.0)
+    assert sim.steps == 1_000_000
+    assert met > 10_000
+    assert sim.energies.rotational == 0.0
+    assert np.abs(off).max() < 1e-4
+    scale = float((sim.masses[:, None] * abs(sim.velocities)).sum())
+    assert abs(sim.masses @ sim.velocities - momentum).max() < 1e-13 * scale
+
+
 def test_energy_comes_back_after_each_elastic_collision():
     sim = pair(contact=Contact(1.0, 0.0), speed=0.4, time_step=1e-6)
     before = sim.energies.total

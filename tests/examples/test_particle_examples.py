@@ -28,15 +28,19 @@ def test_each_case_starts_and_is_measured(path):
     sim = run.simulation
     assert sim.steps == 600
     # Free fall, until something is met.
-    fallen = -sim.velocities[:, 2] - 9.81 * sim.time
+    fallen = sim.velocities[:, 2] - run.case.gravity[2] * sim.time
     assert np.abs(np.median(fallen)) < 0.5
     results = results_of(run)
     assert results["particles"] == len(sim.radii) >= 1
     assert set(results["measures"]) == {table.name for table in run.case.measure}
 
 
-def test_there_are_six_of_them():
-    assert len(CASES) == 6
+def test_the_page_lists_them():
+    page = (EXAMPLES.parent / "docs/particle_cases.md").read_text()
+    assert len(CASES) >= 12
+    for path in CASES:
+        name = path.name.replace("rig_b.toml", "rig_a.toml").replace("rig_c.toml", "rig_a.toml")
+        assert f"`{name}`" in page
 
 
 def test_effects_of_the_silo_are_those_of_its_case(tmp_path):
@@ -60,6 +64,18 @@ def test_effects_of_the_silo_are_those_of_its_case(tmp_path):
     assert {c.rolling_friction for c in case.contact} == {0.3}
     case = build(ParticleCase, sticks, STUDY)
     assert [c.cohesion for c in case.contact] == [50.0, 0.0]
+    losing = copy.deepcopy(content)
+    assert switches["velocity-dependent-restitution"].excluded(losing) is None
+    switches["velocity-dependent-restitution"].apply(losing, 0.25)
+    assert "has it" in switches["velocity-dependent-restitution"].excluded(losing)
+    case = build(ParticleCase, losing, STUDY)
+    assert case.contact_law.normal == "viscoelastic"
+    assert [c.restitution for c in case.contact] == [0.4, 0.4]
+    assert {(c.slow_restitution, c.reference_speed) for c in case.contact} == {(0.5, 1.0)}
+    assert case.contact[0].reference_radius == pytest.approx(2e-3, rel=1e-6)
+    for table, why in (({"normal": "linear"}, "'hertz'"), ({"cohesion": "jkr"}, "'jkr'")):
+        other = {**content, "law": table}
+        assert why in switches["velocity-dependent-restitution"].excluded(other)
     put(content, "wall.funnel.radius", 0.02)
     put(content, "contact.particles.friction", 0.1)
     assert content["wall"][1]["radius"] == 0.02

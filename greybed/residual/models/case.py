@@ -230,7 +230,7 @@ def _distance(first: tuple[float, ...], second: tuple[float, ...]) -> float:
 
 
 def get(content: Any, key: str, place: str = "") -> Any:
-    """Value at a dotted key; an entry of a list is found by its name.
+    """Value at a dotted key; an entry of a list is found by its name, or its number from 0 on.
 
     Raises
     ------
@@ -243,7 +243,8 @@ def get(content: Any, key: str, place: str = "") -> Any:
             named = [
                 item for item in here if isinstance(item, Mapping) and item.get("name") == part
             ]
-            here = named[0] if named else None
+            at = int(part) if part.isdigit() and int(part) < len(here) else None
+            here = named[0] if named else None if at is None else here[at]
         elif isinstance(here, Mapping):
             here = here.get(part)
         else:
@@ -256,5 +257,5 @@ def get(content: Any, key: str, place: str = "") -> Any:
 def put(content: dict[str, Any], key: str, value: float) -> None:
     """Set the value at a dotted key that exists."""
     *front, last = key.split(".")
-    target = get(content, ".".join(front)) if front else content
-    target[last] = value
+    target: Any = get(content, ".".join(front)) if front else content
+    target[int(last) if isinstance(target, list) else last] = value

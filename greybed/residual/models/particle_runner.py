@@ -8,6 +8,8 @@ from typing import Any
 
 from greybed.core.config import build
 from greybed.core.readers import read_packing
+from greybed.core.sizes import parse_sizes
+from greybed.core.units import parse_quantity
 from greybed.dem.case import ParticleCase
 from greybed.dem.case_tables import FileTable
 from greybed.dem.results import results_of
@@ -38,11 +40,12 @@ class ParticleRunner(Runner):
         return {**content, "seed": seed}
 
     def switches(self) -> dict[str, Switch]:
-        """Rolling resistance, cohesion between the particles, friction of the walls."""
+        """Rolling resistance, cohesion, friction of the walls, losses that grow with the speed."""
         return {
             "rolling-resistance": Switch(ROLLING, _roll, _rolls),
             "cohesion": Switch(COHESION, _stick, _sticks),
             "wall-friction": Switch(WALLS, _rub, _rubs),
+            "velocity-dependent-restitution": Switch(IMPACTS, _lose, _loses),
         }
 
 
@@ -86,6 +89,21 @@ WALLS = Effect(
     stage="outcome",
     change=_inside,
     switch="contact.friction = A for contacts with walls",
+)
+IMPACTS = Effect(
+    name="velocity-dependent-restitution",
+    law="viscous losses beside those of the base, so that spheres of the mean radius return "
+    "restitution / (1 + A v^(1/5)) at v = 1 m/s, A in (s/m)^(1/5)",
+    source="viscoelastic spheres (Brilliantov et al., Phys. Rev. E 53 (1996) 5382) lose C v^(1/5) "
+    "at first order (Ramirez et al., Phys. Rev. E 60 (1999) 4465)",
+    group="impact velocity over that of dissipation",
+    theory=None,
+    low=0.005,
+    high=5.0,
+    stage="outcome",
+    change=_inside,
+    switch='law.normal = "viscoelastic", contact.slow_restitution = that of the case, '
+    "contact.restitution = it / (1 + A), contact.reference_speed = 1",
 )
 
 
@@ -136,4 +154,35 @@ def _rubs(content: Mapping[str, Any]) -> str | None:
         return "walls have no material of their own, so no contact of theirs can change"
     if any(table.get("friction", 0.0) != 0.0 for table in walls):
         return "the case has it (contact.friction of the walls)"
+    return None
+
+
+def _mean_radius(content: Mapping[str, Any]) -> float | None:
+    """Of the first particles that have sizes [m]."""
+    for table in content.get("particles", ()):
+        if "sizes" in table:
+            return float(parse_sizes(table["sizes"]).radii(1000).mean())
+    return None
+
+
+def _lose(content: dict[str, Any], amplitude: float) -> None:
+    content.setdefault("law", {})["normal"] = "viscoelastic"
+    for table in content.get("contact", ()):
+        stated = table["restitution"]
+        slow = parse_quantity(stated, "dimensionless") if isinstance(stated, str) else stated
+        table["slow_restitution"] = slow
+        table["restitution"] = slow / (1.0 + amplitude)
+        table["reference_speed"] = 1.0
+        table["reference_radius"] = _mean_radius(content)
+
+
+def _loses(content: Mapping[str, Any]) -> str | None:
+    law = content.get("law", {})
+    normal = law.get("normal", "hertz")
+    if normal == "viscoelastic":
+        return "the case has it (law.normal = 'viscoelastic')"
+    if normal != "hertz" or law.get("cohesion") == "jkr":
+        return "it goes with law.normal = 'hertz', without 'jkr'"
+    if _mean_radius(content) is None:
+        return "no particles have sizes, whose mean the impacts at 1 m/s need"
     return None
