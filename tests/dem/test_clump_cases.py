@@ -1,4 +1,4 @@
-"""Cases with shapes: packs and streams of clumps, sinks, the switch of the shape, every example."""
+"""Cases with shapes: packs and streams of clumps, sinks, the switch of the shape."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from greybed.dem.case import ParticleCase, load_particle_case
 from greybed.dem.results import results_of
 from greybed.dem.runner import ParticleRun
 
-EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "particles").glob("*.toml"))
 CASE = """
 kind = "particles"
 duration = "0.2 s"
@@ -135,11 +134,3 @@ def test_shape_switched_off_gives_spheres_of_the_same_mass(tmp_path: Path) -> No
 def test_bad_shapes_are_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         ParticleRun(case_of(tmp_path, CASE.replace(old, new)), {})
-
-
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_every_example_starts(path: Path) -> None:
-    example = ParticleRun(load_particle_case(path), {}, threads=1)
-    example.simulation.run(20)
-    assert example.simulation.steps == 20
-    assert np.isfinite(example.simulation.centres).all()

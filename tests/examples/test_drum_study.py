@@ -28,7 +28,12 @@ def test_the_drum_switches_what_the_study_may_find(tmp_path):
     content = read_toml(FOLDER / "drum.toml")
     runner = ParticleRunner(FOLDER / "drum.toml", "measures.surface.mean_angle_rad", tmp_path)
     free = {n for n, s in runner.switches().items() if s.excluded(content) is None}
-    assert free == {"rolling-resistance", "cohesion", "velocity-dependent-restitution"}
+    assert free == {
+        "rolling-resistance",
+        "cohesion",
+        "velocity-dependent-restitution",
+        "particle-shape",
+    }
     content["duration"], content["time_step"] = 0.5, 1e-4
     content["wall"][0]["starts"] = 0.15
     content["measure"][0]["average"] = 0.15

@@ -31,7 +31,7 @@ def test_each_case_starts_and_is_measured(path):
     fallen = sim.velocities[:, 2] - run.case.gravity[2] * sim.time
     assert np.abs(np.median(fallen)) < 0.5
     results = results_of(run)
-    assert results["particles"] == len(sim.radii) >= 1
+    assert results["particles"] == sim.count_of() >= 1
     assert set(results["measures"]) == {table.name for table in run.case.measure}
 
 
@@ -73,6 +73,15 @@ def test_effects_of_the_silo_are_those_of_its_case(tmp_path):
     assert [c.restitution for c in case.contact] == [0.4, 0.4]
     assert {(c.slow_restitution, c.reference_speed) for c in case.contact} == {(0.5, 1.0)}
     assert case.contact[0].reference_radius == pytest.approx(2e-3, rel=1e-6)
+    long = copy.deepcopy(content)
+    assert "one size" in switches["particle-shape"].excluded(long)
+    long["particles"][0]["sizes"] = "mono:2mm"
+    assert switches["particle-shape"].excluded(long) is None
+    switches["particle-shape"].apply(long, 0.5)
+    assert "has it" in switches["particle-shape"].excluded(long)
+    (shape,) = build(ParticleCase, long, STUDY).shape
+    assert shape.length == pytest.approx(1.5 * shape.diameter)
+    assert shape.clump().equivalent_radius == pytest.approx(2e-3, rel=1e-6)
     for table, why in (({"normal": "linear"}, "'hertz'"), ({"cohesion": "jkr"}, "'jkr'")):
         other = {**content, "law": table}
         assert why in switches["velocity-dependent-restitution"].excluded(other)

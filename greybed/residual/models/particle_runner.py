@@ -8,7 +8,7 @@ from typing import Any
 
 from greybed.core.config import build
 from greybed.core.readers import read_packing
-from greybed.core.sizes import parse_sizes
+from greybed.core.sizes import Mono, parse_sizes
 from greybed.core.units import parse_quantity
 from greybed.dem.case import ParticleCase
 from greybed.dem.case_tables import FileTable
@@ -23,7 +23,7 @@ class ParticleRunner(Runner):
 
     kind = "particles"
     paths = ()
-    lacks = "the engine has spheres only"
+    lacks = "no case of particles can have it"
 
     def simulate(self, content: dict[str, Any]) -> dict[str, Any]:
         """Run the particles from the start to the end."""
@@ -40,12 +40,13 @@ class ParticleRunner(Runner):
         return {**content, "seed": seed}
 
     def switches(self) -> dict[str, Switch]:
-        """Rolling resistance, cohesion, friction of the walls, losses that grow with the speed."""
+        """Rolling, cohesion, friction of the walls, losses that grow with the speed, shape."""
         return {
             "rolling-resistance": Switch(ROLLING, _roll, _rolls),
             "cohesion": Switch(COHESION, _stick, _sticks),
             "wall-friction": Switch(WALLS, _rub, _rubs),
             "velocity-dependent-restitution": Switch(IMPACTS, _lose, _loses),
+            "particle-shape": Switch(SHAPE, _stretch, _stretches),
         }
 
 
@@ -104,6 +105,19 @@ IMPACTS = Effect(
     change=_inside,
     switch='law.normal = "viscoelastic", contact.slow_restitution = that of the case, '
     "contact.restitution = it / (1 + A), contact.reference_speed = 1",
+)
+
+SHAPE = Effect(
+    name="particle-shape",
+    law="spherocylinders of the spheres' volume, 1 + A times as long as thick",
+    source="rigid bodies of five spheres with the inertia of the smooth shape",
+    group="length over diameter",
+    theory=None,
+    low=0.05,
+    high=3.0,
+    stage="outcome",
+    change=_inside,
+    switch='shape.kind = "spherocylinder", shape.length = (1 + A) shape.diameter',
 )
 
 
@@ -185,4 +199,33 @@ def _loses(content: Mapping[str, Any]) -> str | None:
         return "it goes with law.normal = 'hertz', without 'jkr'"
     if _mean_radius(content) is None:
         return "no particles have sizes, whose mean the impacts at 1 m/s need"
+    return None
+
+
+def _drawn(content: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Tables whose particles are drawn, not read."""
+    return [table for table in content.get("particles", ()) if table.get("kind") != "file"]
+
+
+def _stretch(content: dict[str, Any], amplitude: float) -> None:
+    for number, table in enumerate(_drawn(content)):
+        sizes = parse_sizes(table.pop("sizes"))
+        assert isinstance(sizes, Mono)
+        # Of a ball and of a tube A diameters long with half balls on its ends, the same volume.
+        diameter = 2.0 * sizes.radius * (1.0 + 1.5 * amplitude) ** (-1.0 / 3.0)
+        name = f"stretched-{number}"
+        table["shape"] = name
+        shape = {"kind": "spherocylinder", "name": name, "diameter": diameter}
+        shape["length"] = (1.0 + amplitude) * diameter
+        content.setdefault("shape", []).append(shape)
+
+
+def _stretches(content: Mapping[str, Any]) -> str | None:
+    drawn = _drawn(content)
+    if not drawn or len(drawn) < len(content.get("particles", ())):
+        return "its particles come from a file, as spheres"
+    if any("shape" in table for table in drawn):
+        return "the case has it (particles.shape)"
+    if not all(isinstance(parse_sizes(table["sizes"]), Mono) for table in drawn):
+        return "it goes with spheres of one size in each table (sizes = 'mono:...')"
     return None
