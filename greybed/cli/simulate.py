@@ -2,8 +2,8 @@
 
 kind = "thermal-bed" writes temperatures.csv, bed.vtu (for ParaView) and summary.json; a transient
 case also history.csv. kind = "particles" writes history.csv, final.h5, final.vtu, final.png,
-frames.pvd with its frames, and summary.json; stopped by Ctrl-C or a kill, it goes on from its
-checkpoint when the same command is given again, and ends with the same bits.
+frames.pvd with its frames (or frames.vtkhdf), and summary.json; stopped by Ctrl-C or a kill, it
+goes on from its checkpoint when the same command is given again, and ends with the same bits.
 
 examples:
   greybed simulate examples/heated_bed/case.toml --out runs/heated_bed

@@ -35,9 +35,11 @@ def run_particles(options: argparse.Namespace) -> int:
     folder = output_folder(options.out)
     checkpoint = folder / CHECKPOINT
     with sole_writer(folder / ".simulate.lock"):
-        run = ParticleRun(
-            case, {k: read_packing(path) for k, path in files.items()}, threads=options.threads
-        )
+        packings = {k: read_packing(path) for k, path in files.items()}
+        try:
+            run = ParticleRun(case, packings, threads=options.threads)
+        except InputError as error:
+            raise InputError(f"{options.case}: {error}") from None
         found = 0
         kept = kept_with(checkpoint)
         if kept is not None and kept.get("key") == key:
@@ -50,7 +52,10 @@ def run_particles(options: argparse.Namespace) -> int:
         with progress(run.steps, "time steps", show=not options.quiet) as advance:
             advance(found)
             if not found:
+                frames.clear()
                 frames.write()
+                # A run that fails at once leaves a state, too.
+                run.save(checkpoint, key=key)
             try:
                 for done in run.go_on():
                     moved += done * len(run.simulation.radii)
@@ -66,8 +71,10 @@ def run_particles(options: argparse.Namespace) -> int:
                     run.save(checkpoint, key=key)
                 raise
             except InputError as error:
-                last = f"The last good state is in {checkpoint}." if checkpoint.exists() else ""
-                raise InputError(f"{options.case}: {error} {last}".strip()) from None
+                said = str(error).removesuffix(".")
+                raise InputError(
+                    f"{options.case}: {said}; the last good state is in {checkpoint}."
+                ) from None
         seconds = time.perf_counter() - begin
         _write_history(folder / "history.csv", run)
         final = frames.packing()
@@ -113,7 +120,9 @@ class _Frames:
         import numpy as np
 
         sim = self.run.simulation
+        heat = self.run.heat
         return {
+            **({} if heat is None else {"temperature [K]": heat.temperatures}),
             "velocity [m/s]": sim.velocities,
             "spin [rad/s]": sim.spins,
             "speed [m/s]": np.sqrt((sim.velocities**2).sum(axis=1)),
@@ -122,15 +131,25 @@ class _Frames:
             "body": sim.body_of.astype(np.float64),
         }
 
+    def clear(self) -> None:
+        """Take away frames of an older run in the same folder."""
+        for old in self.folder.glob("frame_*"):
+            old.unlink()
+
     def write(self) -> None:
         """Write the frame of now."""
         if self.every is None:
             return
         from greybed.core.writers import write_packing
+        from greybed.core.writers.vtkhdf import write_part
 
         self.folder.mkdir(exist_ok=True)
-        name = f"frame_{self.run.simulation.steps:010d}"
-        write_packing(self.packing(), self.folder / f"{name}.vtu", fields=self.fields())
+        sim = self.run.simulation
+        name = f"frame_{sim.steps:010d}"
+        if self.run.case.output.format == "vtkhdf":
+            write_part(self.folder / f"{name}.npz", self.packing(), self.fields(), sim.time)
+        else:
+            write_packing(self.packing(), self.folder / f"{name}.vtu", fields=self.fields())
         if self.movie:
             from greybed.report.particles import frame_picture, write_frame
 
@@ -141,6 +160,18 @@ class _Frames:
         """Write the collection of all frames, and the film."""
         if self.every is None:
             return
+        if self.run.case.output.format == "vtkhdf":
+            self._join()
+        else:
+            self._collect()
+        pictures = sorted(self.folder.glob("frame_*.png"))
+        if self.movie and pictures:
+            from greybed.report.particles import write_film
+
+            write_film(self.folder.parent / "movie.gif", pictures, 6.0)
+
+    def _collect(self) -> None:
+        """One page that lists the VTU files."""
         from greybed.core.files import atomic_path
 
         dt = self.run.simulation.time_step
@@ -154,15 +185,22 @@ class _Frames:
                 '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
                 f"{rows}</Collection>\n</VTKFile>\n"
             )
-        pictures = sorted(self.folder.glob("frame_*.png"))
-        if self.movie and pictures:
-            from greybed.report.particles import write_film
 
-            write_film(self.folder.parent / "movie.gif", pictures, 6.0)
+    def _join(self) -> None:
+        """One VTKHDF file of all parts, which go; where they have gone before, it is there."""
+        from greybed.core.writers.vtkhdf import join_parts
+
+        parts = sorted(self.folder.glob("frame_*.npz"))
+        if parts:
+            join_parts(self.folder.parent / "frames.vtkhdf", parts)
+        for part in parts:
+            part.unlink()
 
     def values(self) -> Any:
-        """What pictures are coloured by: the material where there are several, else the height."""
+        """What pictures are coloured by: the temperature where there is one, or the material."""
         sim = self.run.simulation
+        if self.run.heat is not None:
+            return self.run.heat.temperatures
         if len(set(sim.kinds.tolist())) > 1:
             return sim.kinds
         # By the label: one sees what was where at the start.
@@ -170,6 +208,10 @@ class _Frames:
 
     def limits(self) -> tuple[float, float]:
         values = self.values()
+        if (case := self.run.case).heat is not None:
+            tables = (*case.wall, *case.particles, case.heat)
+            known = [t.temperature for t in tables if t.temperature is not None]
+            return min(known), max(*known, min(known) + 1.0)
         return float(min(values.min(), 0)), float(max(values.max(), 1))
 
     def _stage(self) -> Any:

@@ -177,7 +177,8 @@ def _wanted(hint: Any, field: dataclasses.Field[Any]) -> str:
         return "one of " + ", ".join(map(repr, field.metadata["options"]))
     if "dimension" in field.metadata:
         dimension = field.metadata["dimension"]
-        what = "three numbers" if "size" in field.metadata else f"a {dimension}"
+        word = "number" if dimension == "dimensionless" else dimension
+        what = "three numbers" if "size" in field.metadata else f"a {word}"
         return f"{what}{_unit(dimension)}"
     if "rows" in field.metadata:
         return "a list of tables"

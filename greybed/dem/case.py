@@ -2,33 +2,44 @@
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import dataclass, field, fields
 
+import numpy as np
+
 from greybed.core.config import choice, quantity, read_case, rows, tables, vector, whole
 from greybed.core.errors import InputError
+from greybed.dem.case_heat import check_heat
 from greybed.dem.case_tables import (
     NOWHERE,
     SHAPES,
     WALLS,
-    CompartmentsTable,
+    BoundsTable,
     ContactTable,
     EffectsTable,
     FileTable,
+    HeatTable,
     LawTable,
     MaterialTable,
     OutputTable,
     PackTable,
     PeriodicTable,
-    PileTable,
+    PlaneTable,
     ShapeTable,
     SinkTable,
-    SolidTable,
     StreamTable,
     WallTable,
 )
 from greybed.dem.laws import ContactLaw
 from greybed.dem.materials import Contact
+from greybed.dem.measure_tables import (
+    MEASURES,
+    ConductionTable,
+    MeasureTable,
+    ShearTable,
+    SlipTable,
+)
 from greybed.dem.walls import SolidWall
 
 
@@ -53,12 +64,12 @@ class ParticleCase:
         "kind", {"pack": PackTable, "stream": StreamTable, "file": FileTable}
     )
     periodic: PeriodicTable | None = None
+    bounds: BoundsTable | None = None
     sink: tuple[SinkTable, ...] = rows(SinkTable, ())
-    measure: tuple[PileTable | CompartmentsTable | SolidTable, ...] = tables(
-        "kind",
-        {"pile": PileTable, "compartments": CompartmentsTable, "solid": SolidTable},
-        (),
-    )
+    measure: tuple[MeasureTable, ...] = tables("kind", MEASURES, ())
+    heat: HeatTable | None = None
+    # Particles that stand for the cube of this number of real ones; see greybed.dem.coarse.
+    coarse_graining: float = quantity("dimensionless", 1.0, at_least=1.0)
     effects: EffectsTable = field(default_factory=EffectsTable)
     output: OutputTable
 
@@ -68,6 +79,11 @@ class ParticleCase:
             twice = sorted({name for name in names if names.count(name) > 1})
             if twice:
                 raise InputError(f"{what}: name {twice[0]!r} is used twice; give each its own.")
+        shared = {sink.name for sink in self.sink} & {table.name for table in self.measure}
+        if shared:
+            raise InputError(
+                f"a sink and a measure are both called {min(shared)!r}; give each its own name."
+            )
         known = [m.name for m in self.material]
         for part in (*self.particles, *self.wall):
             if part.material is not None and part.material not in known:
@@ -86,6 +102,31 @@ class ParticleCase:
             raise InputError(
                 "no particles are there at the start; let one [[particles]] begin at time 0."
             )
+        for number, table in enumerate(self.particles):
+            # Those that come later must not stop the run then.
+            if isinstance(table, PackTable) and table.at > 0.0 and table.sizes is not None:
+                _check_room(number, table)
+        self._check_walls_of_measures()
+        check_heat(self)
+
+    def _check_walls_of_measures(self) -> None:
+        planes = [wall.name for wall in self.wall if isinstance(wall, PlaneTable)]
+        walls = [wall.name for wall in self.wall]
+        for table in self.measure:
+            wanted: tuple[tuple[str, list[str]], ...] = ()
+            if isinstance(table, ConductionTable):
+                wanted = tuple((name, walls) for name in table.walls)
+            elif isinstance(table, ShearTable):
+                wanted = tuple((name, walls) for name in (*table.walls, table.load))
+            elif isinstance(table, SlipTable):
+                wanted = ((table.wall, planes),)
+            for name, known in wanted:
+                if name not in known:
+                    what = "plane" if known is planes else "wall"
+                    raise InputError(
+                        f"measure {table.name!r}: no {what} is called {name!r}; there are "
+                        f"{', '.join(known) or 'none'}."
+                    )
 
     @property
     def contact_law(self) -> ContactLaw:
@@ -124,6 +165,18 @@ class ParticleCase:
             )
             for wall in self.wall
         ]
+
+
+def _check_room(number: int, table: PackTable) -> None:
+    """Refuse a pack that cannot fit, whatever the places: random ones fill a third."""
+    size = np.array(table.upper) - np.array(table.lower)
+    region = float(size.prod()) * (0.25 * math.pi if table.round else 1.0)
+    solid = 4.0 / 3.0 * math.pi * float((table.distribution.radii(table.count) ** 3).sum())
+    if solid > 0.6 * region:
+        raise InputError(
+            f"particles[{number}]: {table.count} particles of {solid:.3g} [m3] find no room in a "
+            f"region of {region:.3g} [m3]; make it larger, or insert fewer."
+        )
 
 
 def load_particle_case(path: str | os.PathLike[str]) -> ParticleCase:

@@ -16,6 +16,7 @@ from greybed.core.wall_tables import (
     PlaneShape,
     RectangleShape,
 )
+from greybed.core.walls import Mesh, Wall
 from greybed.dem.clump import Clump, sphere_union
 from greybed.dem.clump_shapes import fitted_clump, spherocylinder, tetrapod
 from greybed.dem.insertion import Region
@@ -44,6 +45,8 @@ class MaterialTable:
     density: float = quantity("density", above=0.0)  # [kg/m3]
     youngs_modulus: float = quantity("pressure", above=0.0)  # [Pa]
     poissons_ratio: float = quantity("dimensionless", above=-1.0, at_most=0.5)  # [-]
+    conductivity: float | None = quantity("conductivity", None, above=0.0)  # [W/m/K]
+    heat_capacity: float | None = quantity("heat capacity", None, above=0.0)  # [J/kg/K]
 
     @property
     def material(self) -> Material:
@@ -102,6 +105,7 @@ class _Solid:
     # Force of the particles on the wall along its velocity that moves it no further [N]: the
     # wall goes at its velocity where nothing holds it, and back where more than that pushes.
     servo: float | None = quantity("force", None, above=0.0)
+    temperature: float | None = quantity("temperature", None, above=0.0)  # [K]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,7 +135,25 @@ class RectangleTable(RectangleShape, _Solid):
 
 @dataclass(frozen=True, kw_only=True)
 class MeshTable(MeshShape, _Solid):
-    """``[[wall]]`` with ``kind = "mesh"``."""
+    """``[[wall]]`` with ``kind = "mesh"``: closed, or said to be open."""
+
+    open: bool = False
+
+    def wall(self) -> Wall:
+        """The wall itself.
+
+        Raises
+        ------
+        InputError
+            If the file has holes and nobody said so: particles would fall through.
+        """
+        mesh = super().wall()
+        if isinstance(mesh, Mesh) and not (self.open or mesh.watertight):
+            raise InputError(
+                f"wall {self.name!r}: the mesh {self.file} has holes or open rims, where particles "
+                "fall through; mend it, or say open = true if that is its shape."
+            )
+        return mesh
 
 
 WallTable = PlaneTable | CylinderTable | ConeTable | DiscTable | RectangleTable | MeshTable
@@ -228,6 +250,7 @@ class _Sourced:
 
     material: str
     velocity: tuple[float, float, float] = vector("velocity", NOWHERE)  # [m/s]
+    temperature: float | None = quantity("temperature", None, above=0.0)  # [K]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -296,37 +319,22 @@ class SinkTable:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PileTable:
-    """``[[measure]]`` with ``kind = "pile"``: profile and angle of repose at the end."""
+class HeatTable:
+    """``[heat]``: particles have temperatures, and heat flows through contacts."""
 
-    name: str
-    width: float = quantity("length", above=0.0)  # of a bin [m]
-    axis: str = choice(("heap", "x", "y"), "heap")
-    above: float = quantity("length", -1e30)  # only spheres with centres above this height [m]
-    lower: float = quantity("length", -1e30)  # and between these two along the axis [m]
-    upper: float = quantity("length", 1e30)
-    # The mean angle over the samples of this time before the end; of the end only by default [s].
-    average: float | None = quantity("time", None, above=0.0)
+    temperature: float = quantity("temperature", above=0.0)  # where a table says no other [K]
+    stiffness_ratio: float = quantity("dimensionless", 1.0, above=0.0)  # real over simulated [-]
 
 
 @dataclass(frozen=True, kw_only=True)
-class CompartmentsTable:
-    """``[[measure]]`` with ``kind = "compartments"``: mass shares of the materials at the end."""
+class BoundsTable:
+    """``[bounds]``: the box that no particle may leave, looked after at each look."""
 
-    name: str
-    axis: str = choice(("x", "y", "z"))
-    lower: float = quantity("length")  # [m]
-    upper: float = quantity("length")  # [m]
-    count: int = whole(at_least=1)
-
-
-@dataclass(frozen=True, kw_only=True)
-class SolidTable:
-    """``[[measure]]`` with ``kind = "solid"``: solid fraction and mass in a box at the end."""
-
-    name: str
     lower: tuple[float, float, float] = vector("length")  # [m]
     upper: tuple[float, float, float] = vector("length")  # [m]
+
+    def __post_init__(self) -> None:
+        Region(self.lower, self.upper)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -345,6 +353,7 @@ class OutputTable:
     samples: float = quantity("time", above=0.0)  # rows of history.csv [s]
     frames: float | None = quantity("time", None, above=0.0)  # VTU files; none by default [s]
     checkpoints: float | None = quantity("time", None, above=0.0)  # a tenth of the run [s]
+    format: str = choice(("vtu", "vtkhdf"), "vtu")  # of the frames
 
 
 @dataclass(frozen=True, kw_only=True)

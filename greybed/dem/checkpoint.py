@@ -5,10 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from greybed.core.errors import InputError
 from greybed.core.files import atomic_path
@@ -20,7 +22,13 @@ from greybed.dem.simulation import Simulation
 FORMAT = "greybed-particles-2"
 
 
-def save(simulation: Simulation, path: str | os.PathLike[str], **extra: Any) -> Path:
+def save(
+    simulation: Simulation,
+    path: str | os.PathLike[str],
+    *,
+    beside: Mapping[str, NDArray[Any]] | None = None,
+    **extra: Any,
+) -> Path:
     """Write a checkpoint, whole or not at all.
 
     Parameters
@@ -29,8 +37,10 @@ def save(simulation: Simulation, path: str | os.PathLike[str], **extra: Any) -> 
         Between two runs.
     path : path
         ``.npz`` file to write.
+    beside : dict of arrays, optional
+        Kept beside the state and given back by :func:`restore` under the key ``beside``.
     extra : JSON values
-        Kept beside the state and given back by :func:`restore`.
+        The same, under their own keys.
 
     Raises
     ------
@@ -46,6 +56,7 @@ def save(simulation: Simulation, path: str | os.PathLike[str], **extra: Any) -> 
         )
         for name, value in group._asdict().items()
     }  # fmt: skip
+    arrays |= {f"beside_{name}": value for name, value in (beside or {}).items()}
     numbers = {
         "format": FORMAT,
         "digest": _digest(simulation),
@@ -118,7 +129,8 @@ def restore(simulation: Simulation, path: str | os.PathLike[str]) -> dict[str, A
     simulation.labels = arrays["labels"]
     simulation.steps, simulation._next = int(numbers["steps"]), int(numbers["next"])
     simulation._pending = False
-    return dict(numbers["extra"])
+    kept = {n.removeprefix("beside_"): a for n, a in arrays.items() if n.startswith("beside_")}
+    return {**numbers["extra"], **({"beside": kept} if kept else {})}
 
 
 def kept_with(path: str | os.PathLike[str]) -> dict[str, Any] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -77,15 +78,32 @@ class Heat:
                 raise InputError(f"no wall is called {name!r}; there are {', '.join(names)}.")
             self._walls[names.index(name)] = _checked(value, 1, f"of wall {name!r}", "K")[0]
         self.from_walls = np.zeros(len(names))  # heat that each wall has given [J]
+        self._steps = simulation.steps
 
     @property
     def temperatures(self) -> Array:
         """Of the particles, shape (n,), in the order of ``simulation.centres`` [K]."""
-        labels = self.simulation.labels
-        missing = int(labels.max()) + 1 - len(self._by_label)
-        if missing > 0:
-            self._by_label = np.concatenate([self._by_label, np.full(missing, self._arriving)])
-        return self._by_label[labels]
+        self.arrive(self._arriving)
+        return self._by_label[self.simulation.labels]
+
+    @property
+    def mean(self) -> float:
+        """Mean temperature, weighted by heat capacity [K]."""
+        capacity = self.capacities
+        return float(capacity @ self.temperatures / capacity.sum())
+
+    def arrive(self, temperature: float) -> None:
+        """Give particles that have been inserted since the last call a temperature [K].
+
+        Raises
+        ------
+        InputError
+            If it is not above 0.
+        """
+        new = int(self.simulation.labels.max()) + 1 - len(self._by_label)
+        if new > 0:
+            value = _checked(temperature, 1, "temperature", "K")[0]
+            self._by_label = np.concatenate([self._by_label, np.full(new, value)])
 
     @property
     def capacities(self) -> Array:
@@ -114,6 +132,37 @@ class Heat:
         who, what, deep = who[warm], what[warm], deep[warm]
         at_wall = 2.0 * k[who] * np.sqrt(r[who] * deep) * self._narrower
         return pairs, between, np.stack([who, what], axis=1), at_wall
+
+    def catch_up(self) -> None:
+        """Let heat flow until the time of the simulation, through the contacts of now."""
+        steps = self.simulation.steps - self._steps
+        if steps > 0:
+            self.advance(steps * self.simulation.time_step)
+            self._steps = self.simulation.steps
+
+    def state(self) -> dict[str, NDArray[Any]]:
+        """What goes beside a checkpoint."""
+        return {
+            "heat_steps": np.array(self._steps),
+            "heat_by_label": self._by_label,
+            "heat_from_walls": self.from_walls,
+        }
+
+    def go_back(self, state: Mapping[str, NDArray[Any]]) -> None:
+        """Take up what :meth:`state` has given.
+
+        Raises
+        ------
+        InputError
+            If it is not there.
+        """
+        try:
+            self._steps = int(state["heat_steps"])
+            self._by_label, self.from_walls = state["heat_by_label"], state["heat_from_walls"]
+        except KeyError:
+            raise InputError(
+                "this checkpoint holds no temperatures; give the case that wrote it."
+            ) from None
 
     def advance(self, time: float) -> None:
         """Let heat flow for a time through the contacts of now [s].

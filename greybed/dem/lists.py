@@ -96,8 +96,8 @@ class Lists:
         m = len(more.place)
         self.ident = np.concatenate([self.ident, np.arange(m) + len(self.ident)])
         self.state = joined_states([self.state, more])
-        b, m = len(self.rigid.pose), len(bodies.pose)
-        self.body_ident = np.concatenate([self.body_ident, np.arange(m) + b])
+        new_bodies = np.arange(len(bodies.pose)) + len(self.rigid.pose)
+        self.body_ident = np.concatenate([self.body_ident, new_bodies])
         self.rigid = joined_bodies([self.rigid, bodies])
         near, surfaces = self.near, self.surfaces
         self.near = near._replace(

@@ -8,9 +8,19 @@ from typing import Any
 import numpy as np
 
 from greybed.dem import measures
-from greybed.dem.case_tables import CompartmentsTable, PileTable
+from greybed.dem.bulk_tests import filling_rate, shear_result, slip_result
+from greybed.dem.case_heat import conduction, heat_results
+from greybed.dem.measure_tables import (
+    CompartmentsTable,
+    ConductionTable,
+    PileTable,
+    ShearTable,
+    SlipTable,
+    StressTable,
+)
 from greybed.dem.runner import ParticleRun
 from greybed.dem.slopes import mean_slope, slope_now
+from greybed.dem.stress import stress_in
 
 
 def results_of(run: ParticleRun) -> dict[str, Any]:
@@ -40,6 +50,7 @@ def results_of(run: ParticleRun) -> dict[str, Any]:
             for name, clump in run.feed.shapes.items()
         },
         "bytes_per_particle": sim.bytes_per_particle,
+        **({"heat": heat_results(case, run.heat, tally.history)} if run.heat else {}),
         "sinks": {
             sink.name: {
                 "mass_kg": tally.sunk[k],
@@ -82,6 +93,16 @@ def _measure(run: ParticleRun, table: Any) -> dict[str, Any]:
             "materials": [m.name for m in sim.materials[: shares.shape[1]]],
             "intensity_of_segregation": None if math.isnan(intensity) else intensity,
         }
+    if isinstance(table, StressTable):
+        tensor = stress_in(sim, table.lower, table.upper)
+        return {"stress_Pa": tensor.tolist(), "pressure_Pa": float(np.trace(tensor)) / 3.0}
+    if isinstance(table, ShearTable):
+        return shear_result(table, run.tally.history)
+    if isinstance(table, SlipTable):
+        return slip_result(table, run.tally.history)
+    if isinstance(table, ConductionTable):
+        assert run.heat is not None  # the case has been checked
+        return conduction(table, sim, run.heat, run.tally.history)
     density = np.array([material.density for material in sim.materials])[sim.kinds]
     field = measures.solid_field(
         x, r, table.lower, table.upper, (1, 1, 1), volumes=sim.masses / density
@@ -91,4 +112,5 @@ def _measure(run: ParticleRun, table: Any) -> dict[str, Any]:
         "solid_fraction": float(field[0, 0, 0]),
         "mass_kg": float(sim.masses[inside].sum()),
         "particles": int(inside.sum()),
+        "mass_kg_per_s": filling_rate(run.tally.history, table.name),
     }

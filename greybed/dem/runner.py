@@ -12,10 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from greybed.core.errors import InputError
 from greybed.core.packing import Packing
+from greybed.dem.bulk_tests import measured
 from greybed.dem.case import ParticleCase
-from greybed.dem.case_tables import FileTable, PackTable, StreamTable
+from greybed.dem.case_heat import heat_of, sample_of, start_of
+from greybed.dem.case_tables import BoundsTable, FileTable, PackTable, StreamTable
 from greybed.dem.checkpoint import restore, save
+from greybed.dem.coarse import coarse_case
 from greybed.dem.feeding import Feed
 from greybed.dem.measures import bed_height
 from greybed.dem.simulation import Simulation
@@ -86,7 +90,7 @@ class ParticleRun:
     def __init__(
         self, case: ParticleCase, packings: dict[int, Packing], *, threads: int | None = None
     ) -> None:
-        self.case = case
+        self.case = case = coarse_case(case)
         tables, walls = case.particles, case.wall
         self.tally = Tally(
             [0.0] * len(tables), [0] * len(tables), [0] * len(tables),
@@ -129,6 +133,11 @@ class ParticleRun:
         self.look = LOOK if case.look is None else max(1, round(case.look / dt))
         self._sample = max(1, round(case.output.samples / dt))
         self.emptied = False
+        counts = [
+            len(packings[k]) if isinstance(table, FileTable) else self.tally.inserted[k]
+            for k, table in enumerate(tables)
+        ]
+        self.heat = heat_of(case, self.simulation, self._names, counts)
         if not self.tally.history:
             self._note()
 
@@ -140,6 +149,7 @@ class ParticleRun:
         end = self.steps if until is None else min(until, self.steps)
         while sim.steps < end:
             before = sim.steps
+            self._warm()
             self._events(before)
             if self.emptied:
                 self._note()
@@ -147,9 +157,16 @@ class ParticleRun:
             stop = min(end, (before // self.look + 1) * self.look)
             stop = min(stop, (before // self._sample + 1) * self._sample)
             sim.run(stop - before)
+            self._warm()
             if sim.steps % self._sample == 0 or sim.steps == self.steps:
                 self._note()
             yield sim.steps - before
+
+    def _warm(self) -> None:
+        """Let heat catch up, at looks and at the end only: a stop between them changes no bit."""
+        steps = self.simulation.steps
+        if self.heat is not None and (steps % self.look == 0 or steps == self.steps):
+            self.heat.catch_up()
 
     def _events(self, step: int) -> None:
         """What begins, comes or goes at this step."""
@@ -167,10 +184,13 @@ class ParticleRun:
             if now(wall.stops):
                 sim.move_wall(wall.name)
             elif wall.servo is not None and wall.starts <= sim.time < wall.stops:
-                self._servo(k)
+                # At looks only, not where a run was stopped, too: that must change no bit.
+                self._servo(k, step)
         if step % self.look:
             return
         self._sink()
+        if case.bounds is not None:
+            self._check_bounds(case.bounds)
         if step == 0:
             return
         for number, table in enumerate(case.particles):
@@ -178,13 +198,15 @@ class ParticleRun:
             if owes or (isinstance(table, PackTable) and table.at > 0.0 and now(table.at)):
                 assert not isinstance(table, FileTable)
                 self.feed.drawn(number, table, sim.centres, sim.radii, sim.time).enter(sim)
+                if self.heat is not None:
+                    self.heat.arrive(start_of(case, number))
 
-    def _servo(self, k: int) -> None:
+    def _servo(self, k: int, step: int) -> None:
         """Turn a wall's speed towards where its force is the wanted one."""
         wall, tally = self.case.wall[k], self.tally
         assert wall.servo is not None
         speed = np.linalg.norm(wall.velocity)
-        if speed == 0.0:
+        if speed == 0.0 or step % self.look:
             return
         along = np.array(wall.velocity) / speed
         # What the particles push back with, over what is wanted.
@@ -193,6 +215,18 @@ class ParticleRun:
         tally.servo[k] += _SERVO * (wanted - tally.servo[k])
         share = tally.servo[k]
         self.simulation.move_wall(wall.name, tuple(share * v for v in wall.velocity))
+
+    def _check_bounds(self, bounds: BoundsTable) -> None:
+        sim = self.simulation
+        x = sim.centres
+        out = ((x < np.array(bounds.lower)) | (x > np.array(bounds.upper))).any(axis=1)
+        if out.any():
+            who = int(out.argmax())
+            place = ", ".join(f"{c:.4g}" for c in x[who])
+            raise InputError(
+                f"step {sim.steps}: particle {int(sim.labels[who])} is at ({place}) [m], outside "
+                "the bounds; close the walls, check that none is passed, or put a [[sink]] there."
+            )
 
     def _sink(self) -> None:
         sim = self.simulation
@@ -231,13 +265,17 @@ class ParticleRun:
             for axis, value in zip("xyz", force, strict=True):
                 row[f"force {axis} on {wall.name} [N]"] = float(value)
         row |= slopes(self.case, sim)
+        row |= measured(self.case, sim)
+        if self.heat is not None:
+            row |= sample_of(self.case, self.heat)
         self.tally.history.append(row)
 
     # -- files ------------------------------------------------------------------------------
 
     def save(self, path: str | os.PathLike[str], **extra: Any) -> Path:
         """Write a checkpoint, with the tallies and what else is given."""
-        return save(self.simulation, path, tally=vars(self.tally), **extra)
+        heat = None if self.heat is None else self.heat.state()
+        return save(self.simulation, path, beside=heat, tally=vars(self.tally), **extra)
 
     def restore(self, path: str | os.PathLike[str]) -> dict[str, Any]:
         """Go back to a checkpoint; returns what else was given to :meth:`save`."""
@@ -245,6 +283,9 @@ class ParticleRun:
         self.tally = Tally(**extra.pop("tally"))
         self.feed.streamed, self.feed.inserted = self.tally.streamed, self.tally.inserted
         self.feed.batches = self.tally.batches
+        beside = extra.pop("beside", {})
+        if self.heat is not None:
+            self.heat.go_back(beside)
         return extra
 
 

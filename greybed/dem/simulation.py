@@ -199,6 +199,7 @@ class Simulation(Population):
                 self._raise_lost(who)
             if why == _step.RENEW:
                 # In the middle of a step: the way is done, the forces are not.
+                self._check_speeds()
                 lists.renew()
                 self._state = lists.state
                 self._forces(self.time_step)
@@ -281,6 +282,20 @@ class Simulation(Population):
             f"step {self.steps}: particles {i} and {j} at ({place}) [m] overlap by "
             f"{count[b, 1]:.2g} of a radius, more than {self.most_overlap:g}; part them at the "
             "start, or take a smaller time step, stiffer particles or a larger most_overlap."
+        )
+
+    def _check_speeds(self) -> None:
+        """No particle may pass another one or a wall within a step."""
+        v, r = self._state.motion[:, :3], self._state.place[:, 3]
+        speed = np.sqrt((v * v).sum(axis=1))
+        who = int((speed / r).argmax())
+        if speed[who] * self.time_step <= r[who]:
+            return
+        place = ", ".join(f"{c:.4g}" for c in self._state.place[who, :3])
+        raise InputError(
+            f"step {self.steps}: particle {int(self._lists.ident[who])} at ({place}) [m] moves at "
+            f"{speed[who]:.3g} m/s, more than its radius {r[who]:.3g} m in a step, and could pass "
+            "through others; take a smaller time step, and check its velocity and overlaps."
         )
 
     def _raise_lost(self, who: int) -> None:

@@ -11,14 +11,14 @@ import numpy as np
 from greybed.core.errors import InputError
 from greybed.dem import measures
 from greybed.dem.case import ParticleCase
-from greybed.dem.case_tables import PileTable
+from greybed.dem.measure_tables import PileTable
 from greybed.dem.simulation import Simulation
 
 
 def slope_now(simulation: Simulation, table: PileTable) -> dict[str, Any]:
     """Profile of a surface, and its angle; ``angle_deg`` is None with ``why`` where it has none."""
     x, r = simulation.centres, simulation.radii
-    chosen = x[:, 2] > table.above
+    chosen = (x[:, 2] > table.above) & (x[:, 2] < table.below)
     axis = {"heap": None, "x": 0, "y": 1}[table.axis]
     if axis is not None:
         chosen &= (x[:, axis] > table.lower) & (x[:, axis] < table.upper)

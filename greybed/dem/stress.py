@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from greybed.core.errors import InputError
 from greybed.dem import _step
@@ -55,6 +56,61 @@ def pair_forces(simulation: Simulation) -> tuple[NDArray[np.int64], Array, Array
     branches = branches - arms[low] + arms[high]
     pairs = np.stack([lists.ident[low], lists.ident[high]], axis=1)
     return pairs, -alone.crossing[acts, :3], branches
+
+
+def stress_in(simulation: Simulation, lower: ArrayLike, upper: ArrayLike) -> Array:
+    r"""Mean stress of the contacts between particles in a box, compression positive.
+
+    As :func:`stress`, each contact with the share of its branch that lies in the box (Hardy, J.
+    Chem. Phys. 76, 1982, 622): boxes that fill a space share out the stress of the whole.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Between two runs.
+    lower, upper : array_like, shape (3,)
+        Corners, within periodic faces and a diameter from walls: branches to walls are not counted
+        [m].
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        Stress [Pa].
+
+    Raises
+    ------
+    InputError
+        For corners out of range.
+    """
+    low, high = np.asarray(lower, dtype=np.float64), np.asarray(upper, dtype=np.float64)
+    if low.shape != (3,) or high.shape != (3,) or not (high > low).all():
+        raise InputError("lower and upper must be two corners, upper above lower [m].")
+    pairs, forces, branches = pair_forces(simulation)
+    first = simulation.centres[pairs[:, 0]]
+    lists = simulation._lists
+    share = np.zeros(len(pairs))
+    sides = [(-1.0, 0.0, 1.0) if repeats else (0.0,) for repeats in lists.periodic]
+    for image in itertools.product(*sides):
+        # A branch may cross a periodic face: what is beyond it lies in the box of an image.
+        shift = np.where(lists.periodic, np.array(image) * lists.edge, 0.0)
+        share += _share_inside(first + shift, branches, low, high)
+    result: Array = (forces * share[:, None]).T @ branches / float((high - low).prod())
+    return result
+
+
+def _share_inside(start: Array, branch: Array, low: Array, high: Array) -> Array:
+    """Share of the lines from ``start`` to ``start - branch`` that lies in a box [-]."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        a, b = (start - low) / branch, (start - high) / branch
+    enter, leave = np.minimum(a, b), np.maximum(a, b)
+    # Along an axis that a line does not follow it is inside from end to end, or nowhere.
+    along = branch == 0.0
+    inside = (start >= low) & (start < high)
+    enter = np.where(along, np.where(inside, -np.inf, np.inf), enter)
+    leave = np.where(along, np.where(inside, np.inf, -np.inf), leave)
+    first = np.maximum(enter.max(axis=1), 0.0)
+    last = np.minimum(leave.min(axis=1), 1.0)
+    return np.maximum(last - first, 0.0)
 
 
 def stress(simulation: Simulation, volume: float) -> Array:

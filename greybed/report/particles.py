@@ -57,10 +57,12 @@ def write_film(
 
 
 def write_history(path: str | os.PathLike[str], history: Sequence[Mapping[str, float]]) -> Path:
-    """Plots of the samples of a run: energies, height and coordination, what sinks took."""
+    """Plots of the samples of a run: energies, height, coordination, sinks, temperature."""
     time = [row["time [s]"] for row in history]
     sinks = [name for name in history[0] if name.startswith("mass in ")]
-    figure, axes = plt.subplots(1, 3 if sinks else 2, figsize=(11.0, 3.4), layout="constrained")
+    warm = "mean temperature [K]" in history[0]
+    panels = 2 + bool(sinks) + warm
+    figure, axes = plt.subplots(1, panels, figsize=(11.0, 3.4), layout="constrained")
     for name in ("kinetic energy [J]", "rotational energy [J]"):
         axes[0].plot(time, [row[name] or math.nan for row in history], label=name)
     axes[0].set_yscale("log")
@@ -74,6 +76,9 @@ def write_history(path: str | os.PathLike[str], history: Sequence[Mapping[str, f
         axes[2].plot(time, [row[name] for row in history], label=name)
     if sinks:
         axes[2].legend(fontsize=8)
+    if warm:
+        axes[-1].plot(time, [row["mean temperature [K]"] for row in history])
+        axes[-1].set_ylabel("mean temperature [K]")
     for axis in axes:
         axis.set_xlabel("time [s]")
     with atomic_path(path) as part, open(part, "wb") as stream:

@@ -260,7 +260,7 @@ def test_too_little_memory_is_one_sentence(here, capsys, monkeypatch):
         ("", "packing is missing; give"),
         ("packing = []", r"packing is empty; give at least one \[\[packing\]\]"),
         ("packing = 3", "packing must be a list of tables"),
-        (BARE, r"packing\[0\].fraction is missing; give a dimensionless"),
+        (BARE, r"packing\[0\].fraction is missing; give a number"),
         (BARE + "fraction = 0.9", r"fraction = 0\.9 \[-\] must be above 0 and at most 0\.7"),
         (BARE + "fraction = nan", r"fraction = nan \[-\] must be finite"),
         (BARE + 'fraction = "5 mm"', r"fraction: unit 'mm' does not measure"),

@@ -8,6 +8,7 @@ from impacts import GLASS
 
 from greybed.core import InputError, Plane, box_walls
 from greybed.dem import Contact, ContactLaw, Material, Simulation, SolidWall, restore, save
+from greybed.dem.lists import Lists
 
 R = 1e-3
 LAW = ContactLaw(rolling="epsd")
@@ -134,3 +135,18 @@ def test_a_wall_starts_and_stops_on_command():
     sim.move_wall("lift")
     sim.run(20_000)
     assert abs(sim.velocities[0, 2]) < 1e-3
+
+
+def test_old_lists_have_rows_for_spheres_that_come(monkeypatch):
+    sim = box(n=2)
+    rows = []
+    original = Lists.renew
+
+    def renew(self, keep=None):
+        rows.append([len(part.first) for part in (self.near, self.surfaces)])
+        rows.append([len(self.near.into), len(self.state.place) + 1])
+        original(self, keep)
+
+    monkeypatch.setattr(Lists, "renew", renew)
+    sim.insert(np.arange(30).reshape(-1, 1) * [0, 0, 3 * R] + [R, R, 50 * R], R)
+    assert rows == [[39, 39], [39, 39]]

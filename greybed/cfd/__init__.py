@@ -1,0 +1,1 @@
+"""Gas on a staggered grid, and what flows with it."""
