@@ -90,59 +90,110 @@ def _planes(low, high, lower, spacing, count, periodic):
 
 
 @njit(**_OPTIONS)
-def solids_into(place, lower, spacing, cells, periodic, out):
-    """Add volumes of spheres to the cells ``out`` (nz, ny, nx) [m3]; the first lost one, or -1."""
-    most = 1
-    for axis in range(3):
-        for i in range(place.shape[0]):
-            most = max(most, int(2.0 * place[i, 3] / spacing[axis]) + 3)
-    table = np.empty((most + 1, most + 1, most + 1))
+def _cells_of_sphere(x, y, z, r, lower, spacing, cells, periodic, table, cell, volume, at):
+    """Write a sphere's cells and volumes from ``at`` on; the place after the last one."""
     nx, ny, nz = cells[0], cells[1], cells[2]
+    x0, x1 = _planes(x - r, x + r, lower[0], spacing[0], nx, periodic[0])
+    y0, y1 = _planes(y - r, y + r, lower[1], spacing[1], ny, periodic[1])
+    z0, z1 = _planes(z - r, z + r, lower[2], spacing[2], nz, periodic[2])
+    if x0 == x1 and y0 == y1 and z0 == z1:
+        cell[at] = ((z0 % nz) * ny + y0 % ny) * nx + x0 % nx
+        volume[at] = 4.0 / 3.0 * math.pi * r**3
+        return at + 1
+    mx, my, mz = x1 - x0 + 1, y1 - y0 + 1, z1 - z0 + 1
+    for k in range(mz + 1):
+        c = lower[2] + (z0 + k) * spacing[2] - z
+        for j in range(my + 1):
+            b = lower[1] + (y0 + j) * spacing[1] - y
+            for h in range(mx + 1):
+                if h == mx or j == my or k == mz:
+                    table[k, j, h] = 0.0
+                    continue
+                a = lower[0] + (x0 + h) * spacing[0] - x
+                table[k, j, h] = _above(r, h, a, j, b, k, c)
+    for k in range(mz):
+        for j in range(my):
+            for h in range(mx):
+                near = table[k, j, h] - table[k, j, h + 1]
+                near -= table[k, j + 1, h] - table[k, j + 1, h + 1]
+                far = table[k + 1, j, h] - table[k + 1, j, h + 1]
+                far -= table[k + 1, j + 1, h] - table[k + 1, j + 1, h + 1]
+                if near - far > 0.0:
+                    cell[at] = (((z0 + k) % nz) * ny + (y0 + j) % ny) * nx + (x0 + h) % nx
+                    volume[at] = near - far
+                    at += 1
+    return at
+
+
+@njit(**_OPTIONS)
+def outside(place, lower, spacing, cells, periodic):
+    """The first sphere whose centre is not in the grid, or -1."""
     for i in range(place.shape[0]):
-        x, y, z, r = place[i, 0], place[i, 1], place[i, 2], place[i, 3]
         for axis in range(3):
             at = place[i, axis] - lower[axis]
             if not (periodic[axis] or (at >= 0.0 and at <= cells[axis] * spacing[axis])):
                 return i
-        x0, x1 = _planes(x - r, x + r, lower[0], spacing[0], nx, periodic[0])
-        y0, y1 = _planes(y - r, y + r, lower[1], spacing[1], ny, periodic[1])
-        z0, z1 = _planes(z - r, z + r, lower[2], spacing[2], nz, periodic[2])
-        if x0 == x1 and y0 == y1 and z0 == z1:
-            out[z0 % nz, y0 % ny, x0 % nx] += 4.0 / 3.0 * math.pi * r**3
-            continue
-        mx, my, mz = x1 - x0 + 1, y1 - y0 + 1, z1 - z0 + 1
-        for k in range(mz + 1):
-            c = lower[2] + (z0 + k) * spacing[2] - z
-            for j in range(my + 1):
-                b = lower[1] + (y0 + j) * spacing[1] - y
-                for h in range(mx + 1):
-                    if h == mx or j == my or k == mz:
-                        table[k, j, h] = 0.0
-                        continue
-                    a = lower[0] + (x0 + h) * spacing[0] - x
-                    table[k, j, h] = _above(r, h, a, j, b, k, c)
-        for k in range(mz):
-            for j in range(my):
-                for h in range(mx):
-                    near = table[k, j, h] - table[k, j, h + 1]
-                    near -= table[k, j + 1, h] - table[k, j + 1, h + 1]
-                    far = table[k + 1, j, h] - table[k + 1, j, h + 1]
-                    far -= table[k + 1, j + 1, h] - table[k + 1, j + 1, h + 1]
-                    out[(z0 + k) % nz, (y0 + j) % ny, (x0 + h) % nx] += max(near - far, 0.0)
     return -1
 
 
 @njit(**_OPTIONS)
-def centres_into(place, lower, spacing, cells, periodic, out):
+def room(place, spacing):
+    """Cells along an axis that the largest sphere may reach, and entries of all spheres."""
+    most, entries = 1, 0
+    for i in range(place.shape[0]):
+        all_axes = 1
+        for axis in range(3):
+            across = int(2.0 * place[i, 3] / spacing[axis]) + 2
+            most = max(most, across)
+            all_axes *= across
+        entries += all_axes
+    return most, entries
+
+
+@njit(**_OPTIONS)
+def overlaps(place, lower, spacing, cells, periodic, most, first, cell, volume):
+    """Rows of cells and volumes of each sphere, ``first`` (n + 1,); the number of entries."""
+    table = np.empty((most + 1, most + 1, most + 1))
+    at = 0
+    for i in range(place.shape[0]):
+        first[i] = at
+        at = _cells_of_sphere(
+            place[i, 0], place[i, 1], place[i, 2], place[i, 3], lower, spacing, cells, periodic,
+            table, cell, volume, at,
+        )  # fmt: skip
+    first[place.shape[0]] = at
+    return at
+
+
+@njit(**_OPTIONS)
+def centre_cells(place, lower, spacing, cells, periodic, first, cell, volume):
     """The same with each sphere in the cell of its centre."""
     nx, ny, nz = cells[0], cells[1], cells[2]
     for i in range(place.shape[0]):
-        for axis in range(3):
-            at = place[i, axis] - lower[axis]
-            if not (periodic[axis] or (at >= 0.0 and at <= cells[axis] * spacing[axis])):
-                return i
         x, _ = _planes(place[i, 0], place[i, 0], lower[0], spacing[0], nx, periodic[0])
         y, _ = _planes(place[i, 1], place[i, 1], lower[1], spacing[1], ny, periodic[1])
         z, _ = _planes(place[i, 2], place[i, 2], lower[2], spacing[2], nz, periodic[2])
-        out[z % nz, y % ny, x % nx] += 4.0 / 3.0 * math.pi * place[i, 3] ** 3
-    return -1
+        first[i], cell[i] = i, ((z % nz) * ny + y % ny) * nx + x % nx
+        volume[i] = 4.0 / 3.0 * math.pi * place[i, 3] ** 3
+    first[place.shape[0]] = place.shape[0]
+    return place.shape[0]
+
+
+@njit(**_OPTIONS)
+def spread(first, cell, weight, values, out):
+    """Add ``values`` (n, k), times the weights of the rows, to ``out`` (cells, k)."""
+    for i in range(first.size - 1):
+        for m in range(first[i], first[i + 1]):
+            for c in range(values.shape[1]):
+                out[cell[m], c] += weight[m] * values[i, c]
+
+
+@njit(**_OPTIONS)
+def collect(first, cell, weight, field, out):
+    """Fill ``out`` (n, k) with sums of weights times ``field`` (cells, k): the transpose."""
+    for i in range(first.size - 1):
+        for c in range(field.shape[1]):
+            out[i, c] = 0.0
+        for m in range(first[i], first[i + 1]):
+            for c in range(field.shape[1]):
+                out[i, c] += weight[m] * field[cell[m], c]

@@ -18,49 +18,105 @@ METHODS = ("exact", "centre")
 _STEPS = 3
 
 
-def solid_fraction(grid: Grid, centres: Array, radii: Array, *, method: str = "exact") -> Array:
-    r"""Solid fraction of the cells, from spheres.
+class Overlaps:
+    r"""Which cells spheres lie in, with how much of their volume.
 
     Parameters
     ----------
     grid : Grid
         Cells.
-    centres, radii : ndarray, shapes (n, 3), (n,)
-        Spheres; centres lie in the grid, along axes that do not repeat [m].
+    place : ndarray, shape (n, 4)
+        Centres, which lie in the grid along axes that do not repeat, and radii [m].
     method : str
         ``exact``: each cell gets the volume that lies in it, in closed form: caps, and parts
         beyond two and three planes at right angles (for general cells: Strobl, Formella &
         Poeschel, J. Comput. Phys. 311 (2016) 158). ``centre``: all of it where the centre is.
+        What reaches across a rim counts in the cell there, so that the volumes of a sphere add up
+        to its own, to round-off.
 
-    Returns
-    -------
-    fraction : ndarray, shape (nz, ny, nx)
-        Volumes over that of a cell [-]. What reaches across a rim counts in the cell there, so
-        that the sum is the volume of the spheres, to round-off.
+    Attributes
+    ----------
+    first, cell, volume : ndarray, shapes (n + 1,), (m,), (m,)
+        Rows of each sphere: flat numbers of cells, and volumes [m3].
 
     Raises
     ------
     InputError
         If a centre lies outside, or the method is not known.
     """
-    if method not in METHODS:
-        raise InputError(f"method = {method!r} is not known; known are {', '.join(METHODS)}.")
+
+    def __init__(self, grid: Grid, place: Array, *, method: str = "exact") -> None:
+        if method not in METHODS:
+            raise InputError(f"method = {method!r} is not known; known are {', '.join(METHODS)}.")
+        place = np.ascontiguousarray(place)
+        n = len(place)
+        spacing, cells = np.array(grid.spacing), np.array(grid.cells)
+        shape = (np.array(grid.lower, dtype=np.float64), spacing, cells, np.array(grid.periodic))
+        lost = _overlap.outside(place, *shape)
+        if lost >= 0:
+            at = ", ".join(f"{c:.4g}" for c in place[lost, :3])
+            raise InputError(
+                f"a particle at ({at}) [m] lies outside the gas's grid, {grid.lower} to "
+                f"{grid.upper}; make the grid larger or keep the particles in with walls."
+            )
+        self.grid = grid
+        self.first = np.empty(n + 1, np.int64)
+        most, entries = _overlap.room(place, spacing)
+        entries = n if method == "centre" else entries
+        cell, volume = np.empty(entries, np.int64), np.empty(entries)
+        if method == "centre":
+            used = _overlap.centre_cells(place, *shape, self.first, cell, volume)
+        else:
+            used = _overlap.overlaps(place, *shape, most, self.first, cell, volume)
+        self.cell, self.volume = cell[:used], volume[:used]
+        self._whole = 4.0 / 3.0 * np.pi * place[:, 3] ** 3
+
+    def solids(self) -> Array:
+        """Volumes in the cells, shape (nz, ny, nx) [m3]."""
+        out = np.bincount(self.cell, self.volume, minlength=int(np.prod(self.grid.shape)))
+        return out.reshape(self.grid.shape)
+
+    def integral(self, fields: Array) -> Array:
+        """Integrals over each sphere of fields (nz, ny, nx, k), constant in cells; (n, k) [m3]."""
+        fields = np.ascontiguousarray(fields)
+        out = np.empty((len(self._whole), fields.shape[-1]))
+        flat = fields.reshape(-1, fields.shape[-1])
+        _overlap.collect(self.first, self.cell, self.volume, flat, out)
+        return out
+
+    def mean(self, fields: Array) -> Array:
+        """Means over each sphere of fields (nz, ny, nx, k), shape (n, k)."""
+        return self.integral(fields) / self._whole[:, None]
+
+    def share_out(self, values: Array) -> Array:
+        """Values of spheres (n, k) shared out to cells by volume, (nz, ny, nx, k).
+
+        It is the transpose of :meth:`mean`: sums stay, and products with fields.
+        """
+        per_volume = values / self._whole[:, None]
+        out = np.zeros((int(np.prod(self.grid.shape)), values.shape[1]))
+        _overlap.spread(self.first, self.cell, self.volume, per_volume, out)
+        return out.reshape(*self.grid.shape, values.shape[1])
+
+
+def solid_fraction(grid: Grid, centres: Array, radii: Array, *, method: str = "exact") -> Array:
+    """Solid fraction of the cells, shape (nz, ny, nx) [-], from spheres.
+
+    Parameters
+    ----------
+    grid, method
+        As of :class:`Overlaps`.
+    centres, radii : ndarray, shapes (n, 3), (n,)
+        Spheres [m].
+
+    Raises
+    ------
+    InputError
+        If a centre lies outside, or the method is not known.
+    """
     place = np.empty((len(centres), 4))
     place[:, :3], place[:, 3] = centres, radii
-    out = np.zeros(grid.shape)
-    kernel = _overlap.solids_into if method == "exact" else _overlap.centres_into
-    lost = kernel(
-        place, np.array(grid.lower, dtype=np.float64), np.array(grid.spacing), np.array(grid.cells),
-        np.array(grid.periodic), out,
-    )  # fmt: skip
-    if lost >= 0:
-        at = ", ".join(f"{c:.4g}" for c in place[lost, :3])
-        raise InputError(
-            f"particle {lost} at ({at}) [m] lies outside the gas's grid, {grid.lower} to "
-            f"{grid.upper}; make the grid larger or keep the particles in with walls."
-        )
-    out /= grid.cell_volume
-    return out
+    return Overlaps(grid, place, method=method).solids() / grid.cell_volume
 
 
 class Smoother:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from greybed.cfd.grid import Grid
 from greybed.core.errors import InputError
 from greybed.coupling import _overlap
-from greybed.coupling.void_fraction import Smoother, solid_fraction
+from greybed.coupling.void_fraction import Overlaps, Smoother, solid_fraction
 
 POINTS = 400  # per axis of the sums by hand
 
@@ -85,6 +85,17 @@ def test_no_jump_where_a_sphere_passes_a_face():
     assert np.abs(np.diff(seen)).max() * g.cell_volume < 1.01e-6 * np.pi * r[0] ** 2
 
 
+def test_means_and_shares_are_transposes():
+    g, rng = grid(), np.random.default_rng(8)
+    place = np.column_stack([rng.random((50, 3)) * g.upper, rng.uniform(1e-4, 1e-3, 50)])
+    overlaps = Overlaps(g, place)
+    field, values = rng.random((*g.shape, 2)), rng.random((50, 2))
+    shared = overlaps.share_out(values)
+    assert (shared * field).sum() == pytest.approx((values * overlaps.mean(field)).sum(), rel=1e-13)
+    np.testing.assert_allclose(shared.sum(axis=(0, 1, 2)), values.sum(axis=0), rtol=1e-13)
+    np.testing.assert_allclose(overlaps.mean(np.full((*g.shape, 1), 3.0)), 3.0, rtol=1e-12)
+
+
 def test_centres():
     g = grid()
     found = solid_fraction(
@@ -94,7 +105,7 @@ def test_centres():
 
 
 def test_refusals():
-    with pytest.raises(InputError, match=r"particle 1 at \(0.0071"):
+    with pytest.raises(InputError, match=r"a particle at \(0.0071"):
         solid_fraction(grid(), np.array([[0.001, 0, 0], [0.0071, 0, 0]]), np.full(2, 1e-4))
     with pytest.raises(InputError, match="known are exact, centre"):
         solid_fraction(grid(), np.zeros((0, 3)), np.zeros(0), method="divided")
