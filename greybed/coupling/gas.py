@@ -65,6 +65,12 @@ class Gas(Protocol):
         """
 
 
+def imposed_gradient(gas: Gas) -> Array:
+    """Pressure gradient that a gas has besides its field, shape (3,) [Pa/m]."""
+    state = getattr(gas, "state", None)
+    return np.zeros(3) if state is None else np.asarray(state.gradient, dtype=np.float64)
+
+
 def cell_slopes(pressure: Array, grid: Grid) -> Array:
     """Means of the gradients on the two faces of each cell, (nz, ny, nx, 3) [Pa/m].
 

@@ -14,7 +14,7 @@ from greybed.core.errors import InputError
 from greybed.coupling import _exchange
 from greybed.coupling.drag_exchange import DragTerms, Settings, drag_terms
 from greybed.coupling.forces import added_mass, shear_lift, vorticity_of
-from greybed.coupling.gas import Faces, Gas, cell_slopes
+from greybed.coupling.gas import Faces, Gas, cell_slopes, imposed_gradient
 from greybed.coupling.gas_heat import GasHeat
 from greybed.coupling.void_fraction import Overlaps, Smoother
 from greybed.dem.simulation import Simulation
@@ -120,6 +120,7 @@ class GasParticles:
         self.smoother = Smoother(grid, self.settings.width * diameter)
         self.time = 0.0
         self.steps = 0
+        self.gas_report: Any = None  # of the last step
         self._seen: Array | None = None  # gas velocity at the particles, by label
         self._overlaps = self._look()
         self.void, self.least_void, self.limited = self._void_of(self._overlaps)
@@ -206,7 +207,7 @@ class GasParticles:
             warm = self.heat.offer(
                 overlaps, self.smoother, terms.void, terms.reynolds, d, order, dt
             )
-        report = gas.step(
+        report = self.gas_report = gas.step(
             dt, void_fraction=self.void, void_rate=rate, drag=drag, target=aim,
             source=tuple(f / volume for f in source), **warm,
         )  # fmt: skip
@@ -371,7 +372,7 @@ class GasParticles:
 
     def _by_pressure(self, overlaps: Overlaps) -> Array:
         """Minus the integral of the pressure gradient over each particle, (n, 3) [N]."""
-        slopes = cell_slopes(self.gas.pressure, self.gas.grid)
+        slopes = cell_slopes(self.gas.pressure, self.gas.grid) + imposed_gradient(self.gas)
         if not self.smoother.idle:
             for c in range(3):
                 slopes[..., c] = self.smoother.cells(slopes[..., c])
