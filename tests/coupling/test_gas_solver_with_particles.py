@@ -47,7 +47,7 @@ def cloud(settings, *, model="A", gravity=(0.0, 0.0, 0.0), n=5, edge=2.2e-3, cel
 @pytest.mark.parametrize("model", ["A", "B"])
 @pytest.mark.parametrize("treatment", ["explicit", "semi-implicit", "implicit"])
 def test_particles_get_what_the_gas_s_own_budget_loses(model, treatment):
-    both, sim, gas = cloud(Settings(treatment=treatment, lift="saffman-mei"), model=model)
+    both, sim, _ = cloud(Settings(treatment=treatment, lift="saffman-mei"), model=model)
     both.step(5)
     for _ in range(5):
         before = sim.masses @ sim.velocities
@@ -58,8 +58,9 @@ def test_particles_get_what_the_gas_s_own_budget_loses(model, treatment):
         assert np.abs(report.given - lost).max() < 1e-13 * scale
         assert np.abs(report.pressure - (-budget.pressure)).max() < 1e-13 * scale
         gained = sim.masses @ sim.velocities - before
+        rest = budget.transport + budget.lag  # of the gas alone
         assert np.abs(gained - report.given - report.pressure).max() < 1e-13 * scale
-        assert np.abs(gained + budget.change - budget.lag).max() < 1e-12 * scale
+        assert np.abs(gained + budget.change - rest).max() < 1e-13 * scale
 
 
 @pytest.mark.parametrize("model", ["A", "B"])
@@ -90,7 +91,7 @@ def test_heat_goes_from_gas_to_particles_and_none_is_lost():
         t = np.where(np.arange(len(sim.centres)) % 2, 500.0, 350.0)
         return GasHeat(Heat(sim, 1.0, 800.0, t), 0.026, 0.7, nusselt="gunn")
 
-    both, sim, gas = cloud(Settings(), temperature=300.0, heat=heat)
+    both, _, gas = cloud(Settings(), temperature=300.0, heat=heat)
     fluid, volume = gas.fluid, gas.grid.cell_volume
 
     def energy():
@@ -106,14 +107,14 @@ def test_heat_goes_from_gas_to_particles_and_none_is_lost():
     assert moved > 1e-5
     # the gas's own heat: what its continuity solver leaves
     assert abs(energy() - start) < 1e-9 * start
-    assert 300.0 < gas.temperature.mean()
+    assert gas.temperature.mean() > 300.0
 
 
 def test_gas_and_particles_come_to_one_temperature():
     def heat(sim):
         return GasHeat(Heat(sim, 1.0, 0.01, 400.0), 0.026, 0.7, nusselt="sun")
 
-    both, sim, gas = cloud(Settings(), temperature=300.0, heat=heat)
+    both, _, gas = cloud(Settings(), temperature=300.0, heat=heat)
     held = both.heat.heat.capacities.sum() * 400.0
     mass = float(gas.state.mass.sum()) * gas.grid.cell_volume * gas.fluid.heat_capacity
     mixed = (held + 300.0 * mass) / (both.heat.heat.capacities.sum() + mass)
