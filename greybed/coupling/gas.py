@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -69,6 +70,14 @@ def imposed_gradient(gas: Gas) -> Array:
     """Pressure gradient that a gas has besides its field, shape (3,) [Pa/m]."""
     state = getattr(gas, "state", None)
     return np.zeros(3) if state is None else np.asarray(state.gradient, dtype=np.float64)
+
+
+def begin_with(gas: Gas, void_fraction: Array) -> None:
+    """Give a gas that has not moved yet the void fraction that the particles leave it."""
+    state = getattr(gas, "state", None)
+    if state is not None and state.time == 0.0:
+        mass = state.mass / state.void_fraction * void_fraction
+        gas.state = replace(state, void_fraction=void_fraction.copy(), mass=mass)  # type: ignore[attr-defined]
 
 
 def cell_slopes(pressure: Array, grid: Grid) -> Array:

@@ -14,8 +14,9 @@ from greybed.core.errors import InputError
 from greybed.coupling import _exchange
 from greybed.coupling.drag_exchange import DragTerms, Settings, drag_terms
 from greybed.coupling.forces import added_mass, shear_lift, vorticity_of
-from greybed.coupling.gas import Faces, Gas, cell_slopes, imposed_gradient
+from greybed.coupling.gas import Faces, Gas, begin_with, cell_slopes, imposed_gradient
 from greybed.coupling.gas_heat import GasHeat
+from greybed.coupling.transfer import Transfer
 from greybed.coupling.void_fraction import Overlaps, Smoother
 from greybed.dem.simulation import Simulation
 
@@ -113,17 +114,16 @@ class GasParticles:
                     f"along {name} the gas repeats from {low:g} to {high:g} and the particles from "
                     f"{box[0, axis]:g} to {box[1, axis]:g} [m]; make them the same."
                 )
-        self._lower = np.array(grid.lower, dtype=np.float64)
-        self._spacing, self._cells = np.array(grid.spacing), np.array(grid.cells)
-        self._periodic = np.array(grid.periodic)
         diameter = 2.0 * float(simulation._state.place[:, 3].mean())
         self.smoother = Smoother(grid, self.settings.width * diameter)
+        self.transfer = Transfer(grid, self.smoother)
         self.time = 0.0
         self.steps = 0
         self.gas_report: Any = None  # of the last step
         self._seen: Array | None = None  # gas velocity at the particles, by label
         self._overlaps = self._look()
         self.void, self.least_void, self.limited = self._void_of(self._overlaps)
+        begin_with(gas, self.void)
 
     # -- time -------------------------------------------------------------------------------
 
@@ -133,7 +133,7 @@ class GasParticles:
         The gas's own limit and that of explicit drag are not in it.
         """
         speed = np.abs(self.simulation._state.motion[:, :3]).max(axis=0, initial=0.0)
-        rate = float((speed / self._spacing).max())
+        rate = float((speed / np.array(self.gas.grid.spacing)).max())
         most = _SHARE_OF_CELL / max(rate, 1e-300) / self.simulation.time_step
         return max(1, int(min(most, 1e9)))
 
@@ -183,8 +183,13 @@ class GasParticles:
         terms = self._terms(overlaps, seen)
         steady = self._steady(overlaps, terms, seen, dt)
         k, target = self._linear(terms, seen, dt)
-        total, aimed = self._give(k, target)
-        loads = self._give_force(-steady) if steady is not None else None
+        place = sim._state.place
+        total, aimed = self.transfer.give(
+            place, np.broadcast_to(k[:, None], target.shape), k[:, None] * target
+        )
+        loads: Any = None
+        if steady is not None:
+            loads, _ = self.transfer.give(place, -steady, np.zeros_like(steady))
         volume = gas.grid.cell_volume
         none = tuple(np.zeros(s) for s in gas.grid.face_shapes)
         if self.settings.treatment == "explicit":
@@ -219,10 +224,11 @@ class GasParticles:
         force = k[:, None] * (new - target)
         given = dt * force.sum(axis=0)
         parts = dt * np.abs(force).sum(axis=0)
-        taken, rims = self._lost(total, aimed, at, dt)
+        lost = [dt * (b * u - a) for b, u, a in zip(total, at, aimed, strict=True)]
+        taken, rims = self.transfer.split(lost)
         if steady is not None:
             given += dt * steady.sum(axis=0)
-            inside, outside = self._split([-f for f in loads or none])
+            inside, outside = self.transfer.split([-f for f in loads])
             taken, rims = taken + dt * inside, rims + dt * outside
             force = force + steady
         if self.settings.pressure and gas.model == "A":
@@ -256,60 +262,7 @@ class GasParticles:
         return np.maximum(void, limit), float(void.min()), int(low.sum())
 
     def _read(self, velocity: Faces) -> Array:
-        """Gas velocities at the particles, (n, 3)."""
-        place = self.simulation._state.place
-        out = np.empty((len(place), 3))
-        for axis, field in enumerate(velocity):
-            values = np.empty(len(place))
-            _exchange.read_faces(
-                place, axis, self._lower, self._spacing, self._cells, self._periodic,
-                np.ascontiguousarray(self.smoother.faces(field, axis)), values,
-            )  # fmt: skip
-            out[:, axis] = values
-        return out
-
-    def _give(self, k: Array, target: Array) -> tuple[list[Array], list[Array]]:
-        """Drag coefficients and those times targets, summed on the faces: transpose of reading."""
-        place, total, aimed = self.simulation._state.place, [], []
-        for axis, shape in enumerate(self.gas.grid.face_shapes):
-            b, a = np.zeros(shape), np.zeros(shape)
-            _exchange.give_to_faces(
-                place, axis, self._lower, self._spacing, self._cells, self._periodic, k,
-                k * target[:, axis], b, a,
-            )  # fmt: skip
-            total.append(self.smoother.faces(b, axis))
-            aimed.append(self.smoother.faces(a, axis))
-        return total, aimed
-
-    def _give_force(self, force: Array) -> list[Array]:
-        """Forces summed on the faces."""
-        place, out = self.simulation._state.place, []
-        for axis, shape in enumerate(self.gas.grid.face_shapes):
-            f, idle = np.zeros(shape), np.zeros(shape)
-            _exchange.give_to_faces(
-                place, axis, self._lower, self._spacing, self._cells, self._periodic,
-                np.ascontiguousarray(force[:, axis]), np.zeros(len(place)), f, idle,
-            )  # fmt: skip
-            out.append(self.smoother.faces(f, axis))
-        return out
-
-    def _split(self, faces: list[Array]) -> tuple[Array, Array]:
-        """Sums of face values inside, and at rims, (3,) each; faces that repeat count once."""
-        inside, rims = np.empty(3), np.zeros(3)
-        for axis, field in enumerate(faces):
-            ends = np.moveaxis(field, 2 - axis, 0)
-            if self._periodic[axis]:
-                inside[axis] = ends[:-1].sum()
-            else:
-                inside[axis], rims[axis] = ends[1:-1].sum(), ends[0].sum() + ends[-1].sum()
-        return inside, rims
-
-    def _lost(
-        self, total: list[Array], aimed: list[Array], velocity: Faces, dt: float
-    ) -> tuple[Array, Array]:
-        """Momentum that drag takes from the gas, inside and at rims [N s]."""
-        parts = [dt * (b * u - a) for b, u, a in zip(total, velocity, aimed, strict=True)]
-        return self._split(parts)
+        return self.transfer.read(velocity, self.simulation._state.place)
 
     def _terms(self, overlaps: Overlaps, seen: Array) -> DragTerms:
         state, fluid = self.simulation._state, self.gas.fluid
