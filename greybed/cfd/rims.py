@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 # Cells before and behind those of the grid, along each axis that has any extent.
 BEFORE, BEHIND = 2, 3
+# Order of [z, y, x] that brings an axis to the front.
+_FIRST = ((2, 0, 1), (1, 0, 2), (0, 1, 2))
 
 
 @dataclass(frozen=True)
@@ -116,7 +118,7 @@ class Rims:
 
     def along(self, flat: Array, a: int) -> Array:
         """View with an axis first."""
-        return np.moveaxis(flat.reshape(self.shape), 2 - a, 0)
+        return flat.reshape(self.shape).transpose(_FIRST[a])
 
     def _repeat(self, box: Array, n: int) -> None:
         for to in (1, 0):
