@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from greybed.cli.simulate_flow import run_flow
 from greybed.cli.simulate_particles import run_particles
 from greybed.core.config import read_toml
 from greybed.core.errors import InputError
@@ -48,8 +49,11 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(
             f"--threads = {options.threads} [-] must be at least 1; leave it out for all."
         )
-    if read_toml(options.case).get("kind") == "particles":
+    kind = read_toml(options.case).get("kind")
+    if kind == "particles":
         return run_particles(options)
+    if kind in ("two-fluid", "gas"):
+        return run_flow(options, str(kind))
     if options.movie:
         raise InputError("--movie is for particles only; leave it out.")
     case = load_case(options.case)
