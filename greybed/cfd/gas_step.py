@@ -1,0 +1,198 @@
+"""One part of a step of the gas: forces, pressure, temperature, budget."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from greybed.cfd import _momentum, energy, forces
+from greybed.cfd.boundaries import Sides, lead
+from greybed.cfd.fluid import Fluid
+from greybed.cfd.gas_state import Gas, Inputs, Tally
+from greybed.cfd.grid import AXES, Grid
+from greybed.cfd.projection import Projection
+from greybed.core.errors import InputError
+
+Array = NDArray[np.float64]
+Faces = tuple[Array, Array, Array]
+
+# Explicit convection: cells crossed in a step, summed over the axes.
+_COURANT = 0.5
+# Share of the limit of stability of explicit viscosity: a half for Adams-Bashforth, and some room.
+_VISCOUS = 0.4
+
+
+class TooLong(Exception):
+    """This step must be shorter."""
+
+
+class Part:
+    """Advances states of a gas; see :class:`greybed.cfd.gas.GasSolver`."""
+
+    def __init__(
+        self, sides: Sides, fluid: Fluid, projection: Projection, model: str,
+        mean_flow: tuple[float | None, ...], budget: bool,
+    ) -> None:  # fmt: skip
+        self.grid, self.sides, self.fluid = sides.grid, sides, fluid
+        self._projection, self.model, self.mean_flow = projection, model, mean_flow
+        self.budget = budget
+
+    def advance(self, s: Gas, dt: float, given: Inputs, share: float, tally: Tally) -> Gas:
+        """The state after ``dt``; ``share`` of its step goes into the sums."""
+        sides, grid, project = self.sides, self.grid, self._projection
+        courant = self.crossings(s.velocity) * dt
+        if courant > 1.01 * _COURANT:
+            raise TooLong(f"gas crosses {courant:.2g} cells at {self._fastest(s.velocity)}.")
+        if dt > 1.01 * self.viscous_limit(s):
+            raise TooLong("viscosity spreads over more than a cell.")
+        flux = _products(project.mass_on_faces(s.mass, s.void_fraction), s.velocity)
+        eps = sides.cells(s.void_fraction)
+        now = forces.transport(sides, s.velocity, flux, self.fluid.viscosity * eps)
+        a, b, before = 1.0, 0.0, now
+        if s.rates is not None:
+            a, b, before = 1.0 + 0.5 * dt / s.before, -0.5 * dt / s.before, s.rates
+        mass, growth = self._masses(s, dt, given, flux)
+        faces = project.mass_on_faces(mass, given.void)
+        shares = self._shares(given.void)
+        slope = forces.slopes(sides, s.pressure)
+        star = [np.empty(shape) for shape in grid.face_shapes]
+        gain = [np.empty(shape) for shape in grid.face_shapes]
+        for axis in range(3):
+            arrays = (
+                faces[axis], shares[axis], slope[axis] + s.gradient[axis], given.drag[axis],
+                given.target[axis], given.source[axis],
+            )  # fmt: skip
+            _momentum.predict(
+                s.velocity[axis].ravel(), now[axis].ravel(), before[axis].ravel(), a, b,
+                *(x.ravel() for x in arrays), given.gravity[axis], dt, star[axis].ravel(),
+                gain[axis].ravel(),
+            )  # fmt: skip
+        velocity: Faces = (star[0], star[1], star[2])
+        project.hold_rims(velocity, given.void)
+        project.close_rims(gain)
+        try:
+            p, iterations, left, imbalance = project.correct(velocity, gain, faces, growth)
+            gradient = s.gradient
+            for axis, flow in enumerate(self.mean_flow):
+                if flow is not None:
+                    extra, more, count = project.steer(
+                        velocity, gain, faces, given.void, axis, flow
+                    )
+                    p, iterations, gradient = p + extra, iterations + count, gradient.copy()
+                    gradient[axis] += more
+        except InputError as reason:
+            raise TooLong(str(reason)) from None
+        for axis, u in enumerate(velocity):
+            if not np.isfinite(u).all():
+                place = _place(grid, axis, int(np.argmin(np.isfinite(u))), u.shape)
+                raise TooLong(f"the velocity along {AXES[axis]} at {place} is not finite.")
+        temperature = s.temperature
+        if given.heating is not None:
+            temperature, heat = energy.advance(
+                sides, self.fluid, s.temperature, mass - dt * growth, mass,
+                _products(faces, velocity), given.void, given.heating, dt,
+            )  # fmt: skip
+            tally.heat = share * heat + (0.0 if tally.heat is None else tally.heat)
+        new = Gas(
+            velocity, s.pressure + p, given.void, mass, temperature, s.time + dt, gradient, now, dt
+        )
+        if self.budget:
+            transport = [a * n + b * o for n, o in zip(now, before, strict=True)]
+            self._account(tally.budget, s, new, given, transport, flux, shares)
+        if tally.seen is None:
+            tally.seen = [share * u for u in velocity]
+        else:
+            for total, u in zip(tally.seen, velocity, strict=True):
+                total += share * u
+        tally.parts += 1
+        tally.iterations += iterations
+        tally.divergence = max(tally.divergence, left)
+        tally.courant = max(tally.courant, courant)
+        tally.imbalance += share * imbalance
+        return new
+
+    def _masses(self, s: Gas, dt: float, given: Inputs, flux: Faces) -> tuple[Array, Array]:
+        """Mass of gas per volume after the step and its rate.
+
+        That of an ideal gas is from temperatures that the last mass fluxes would bring about.
+        """
+        if self.fluid.molar_mass is None or given.heating is None:
+            return self.fluid.density * given.void, self.fluid.density * given.rate
+        after = s.mass - dt * forces.outflow(self.sides, flux)
+        t, _ = energy.advance(
+            self.sides, self.fluid, s.temperature, s.mass, after, flux, given.void, given.heating,
+            dt,
+        )  # fmt: skip
+        mass = given.void * self.fluid.density_at(t)
+        return mass, (mass - s.mass) / dt
+
+    def _shares(self, void: Array) -> Faces:
+        """Share of the pressure's slope that the gas bears, on faces."""
+        if self.model == "B":
+            x, y, z = (np.ones(shape) for shape in self.grid.face_shapes)
+        else:
+            padded = self.sides.cells(void)
+            x, y, z = (forces.on_faces(self.sides, padded, axis) for axis in range(3))
+        return x, y, z
+
+    def _account(
+        self, sums: list[Array], s: Gas, new: Gas, given: Inputs, transport: list[Array],
+        flux: Faces, shares: Faces,
+    ) -> None:  # fmt: skip
+        """Add the budget of momentum of a part."""
+        project, dt, volume = self._projection, new.before, self.grid.cell_volume
+        old, now = (project.mass_on_faces(x.mass, x.void_fraction) for x in (s, new))
+        slope = forces.slopes(self.sides, new.pressure)
+        spill = self.sides.cells(forces.outflow(self.sides, flux))
+        for axis in range(3):
+            u, v = s.velocity[axis], new.velocity[axis]
+            lost = forces.on_faces(self.sides, spill, axis) * u  # u div F, which convection leaves
+            parts = (
+                now[axis] * v - old[axis] * u,
+                dt * (transport[axis] - lost),
+                -dt * shares[axis] * (slope[axis] + new.gradient[axis]),
+                -dt * given.drag[axis] * (v - given.target[axis]),
+                dt * given.source[axis],
+                dt * now[axis] * given.gravity[axis],
+                (now[axis] - old[axis]) * u + dt * lost,
+            )
+            periodic = self.grid.periodic[axis]
+            for total, part in zip(sums, parts, strict=True):
+                inside = lead(part, axis)[1 : None if periodic else -1]
+                total[axis] += volume * float(inside.sum())
+
+    # -- checks and limits ------------------------------------------------------------------
+
+    def crossings(self, velocity: Faces) -> float:
+        """Largest number of cells crossed per time, summed over axes [1/s]."""
+        total = np.zeros(self.grid.shape)
+        for axis, (u, c) in enumerate(zip(velocity, forces.rates(self.sides), strict=True)):
+            a, t = np.abs(lead(u, axis)), lead(total, axis)
+            t += c * np.maximum(a[1:], a[:-1])
+        return float(total.max())
+
+    def _fastest(self, velocity: Faces) -> str:
+        """Where the gas is fastest."""
+        axis = int(np.argmax([np.abs(u).max() for u in velocity]))
+        u = velocity[axis]
+        return _place(self.grid, axis, int(np.abs(u).argmax()), u.shape)
+
+    def viscous_limit(self, s: Gas) -> float:
+        """Longest step of explicit viscosity [s]."""
+        c = forces.rates(self.sides)
+        lightest = self.fluid.density
+        if self.fluid.molar_mass is not None:
+            lightest = float((s.mass / s.void_fraction).min())
+        # Normal stresses count 4/3, and shear once more through the transposed gradient.
+        spread = 2.0 * self.fluid.viscosity / lightest * (sum(x**2 for x in c) + max(c) ** 2 / 3.0)
+        return _VISCOUS / max(spread, 1e-300)
+
+
+def _products(mass: Faces, velocity: Faces) -> Faces:
+    x, y, z = (m * u for m, u in zip(mass, velocity, strict=True))
+    return x, y, z
+
+
+def _place(grid: Grid, axis: int, number: int, shape: tuple[int, ...]) -> str:
+    k, j, i = (int(n) for n in np.unravel_index(number, shape))
+    return f"face {i}, {j}, {k} (x, y, z) across {AXES[axis]}"
