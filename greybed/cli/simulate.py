@@ -4,10 +4,12 @@ kind = "thermal-bed" writes temperatures.csv, bed.vtu (for ParaView) and summary
 case also history.csv. kind = "particles" writes history.csv, final.h5, final.vtu, final.png,
 frames.pvd with its frames (or frames.vtkhdf), and summary.json; stopped by Ctrl-C or a kill, it
 goes on from its checkpoint when the same command is given again, and ends with the same bits.
+--engine liggghts hands the same case to LIGGGHTS and reads its results back (docs/liggghts.md).
 
 examples:
   greybed simulate examples/heated_bed/case.toml --out runs/heated_bed
   greybed simulate examples/particles/hopper.toml --out runs/hopper --movie
+  greybed simulate examples/particles/hopper.toml --out runs/hopper2 --engine liggghts --ranks 2
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from greybed.cli.simulate_liggghts import run_liggghts
 from greybed.cli.simulate_particles import run_particles
 from greybed.core.config import read_toml
 from greybed.core.errors import InputError
@@ -33,6 +36,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder for the results")
     parser.add_argument("--threads", type=int, help="threads (default: all); changes no bit")
     parser.add_argument("--movie", action="store_true", help="particles: movie.gif of the frames")
+    parser.add_argument(
+        "--engine", choices=("greybed", "liggghts"), default="greybed",
+        help="particles: who moves them (default: greybed); liggghts runs through MPI",
+    )  # fmt: skip
+    parser.add_argument("--ranks", type=int, help="liggghts: MPI ranks (default: 1)")
     parser.add_argument("--quiet", action="store_true", help="no progress bars")
 
 
@@ -48,8 +56,14 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(
             f"--threads = {options.threads} [-] must be at least 1; leave it out for all."
         )
+    if options.ranks is not None and options.engine != "liggghts":
+        raise InputError("--ranks is for --engine liggghts only; take --threads, or leave it out.")
     if read_toml(options.case).get("kind") == "particles":
+        if options.engine == "liggghts":
+            return run_liggghts(options)
         return run_particles(options)
+    if options.engine != "greybed":
+        raise InputError(f"--engine {options.engine} is for particles only; leave it out.")
     if options.movie:
         raise InputError("--movie is for particles only; leave it out.")
     case = load_case(options.case)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,16 +13,15 @@ from numpy.typing import NDArray
 
 from greybed.core.errors import InputError
 from greybed.core.packing import Packing
-from greybed.dem.bulk_tests import measured
 from greybed.dem.case import ParticleCase
 from greybed.dem.case_heat import heat_of, sample_of, start_of
 from greybed.dem.case_tables import BoundsTable, FileTable, PackTable, StreamTable
 from greybed.dem.checkpoint import restore, save
+from greybed.dem.clump import Clump
 from greybed.dem.coarse import coarse_case
 from greybed.dem.feeding import Feed
-from greybed.dem.measures import bed_height
+from greybed.dem.samples import Tally, sample
 from greybed.dem.simulation import Simulation
-from greybed.dem.slopes import slopes
 
 Array = NDArray[np.float64]
 
@@ -31,37 +29,6 @@ Array = NDArray[np.float64]
 LOOK = 200
 # Share of its velocity that a servo wall changes by at each look.
 _SERVO = 0.2
-
-
-@dataclass
-class Tally:
-    """What has come and gone, kept with each checkpoint.
-
-    Attributes
-    ----------
-    streamed : list of float
-        Mass that each table of particles has put in [kg].
-    inserted : list of int
-        Particles of each table.
-    batches : list of int
-        Batches of each table, for the random numbers of the next one.
-    sunk : list of float
-        Mass that each sink has taken [kg].
-    taken : list of int
-        Particles of each sink.
-    servo : list of float
-        Present share of its velocity of each wall with a servo.
-    history : list of dict
-        Samples.
-    """
-
-    streamed: list[float]
-    inserted: list[int]
-    batches: list[int]
-    sunk: list[float]
-    taken: list[int]
-    servo: list[float]
-    history: list[dict[str, float]] = field(default_factory=list)
 
 
 class ParticleRun:
@@ -140,6 +107,11 @@ class ParticleRun:
         self.heat = heat_of(case, self.simulation, self._names, counts)
         if not self.tally.history:
             self._note()
+
+    @property
+    def shapes(self) -> dict[str, Clump]:
+        """Shapes of clumps, by name."""
+        return self.feed.shapes
 
     # -- time -------------------------------------------------------------------------------
 
@@ -245,27 +217,7 @@ class ParticleRun:
 
     def _note(self) -> None:
         """A sample of the history."""
-        sim, e = self.simulation, self.simulation.energies
-        row = {
-            "time [s]": sim.time,
-            "particles [-]": float(sim.count_of()),
-            "mass [kg]": float(sim.masses.sum()),
-            "kinetic energy [J]": e.kinetic,
-            "rotational energy [J]": e.rotational,
-            "potential energy [J]": e.potential,
-            "height [m]": bed_height(sim.centres, sim.radii),
-            "coordination [-]": sim.coordination,
-        }
-        for sink, mass, count in zip(
-            self.case.sink, self.tally.sunk, self.tally.taken, strict=True
-        ):
-            row[f"mass in {sink.name} [kg]"] = mass
-            row[f"particles in {sink.name} [-]"] = float(count)
-        for wall, force in zip(self.case.wall, sim.wall_forces, strict=True):
-            for axis, value in zip("xyz", force, strict=True):
-                row[f"force {axis} on {wall.name} [N]"] = float(value)
-        row |= slopes(self.case, sim)
-        row |= measured(self.case, sim)
+        row = sample(self.case, self.simulation, self.tally)
         if self.heat is not None:
             row |= sample_of(self.case, self.heat)
         self.tally.history.append(row)
