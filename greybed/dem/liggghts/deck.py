@@ -160,7 +160,8 @@ class _Writer:
         # Ranks beside each other, not above each other: a bed fills the lower part only.
         down = int(np.abs(sim.gravity).argmax()) if sim.gravity.any() else -1
         cut = " ".join("1" if axis == down else "*" for axis in range(3))
-        masses = [self._mass(m.name) for m in self.types.particles]
+        linear = law.normal == "linear"
+        masses = [self._mass(m.name) for m in self.types.particles] if linear else []
         size = float(np.linalg.norm(sim.gravity))
         self.lines += [
             "# A case of particles, written by greybed simulate --engine liggghts.",
@@ -287,7 +288,7 @@ class _Writer:
         self.lines.append(f"run {steps}" + (f" every {self.run.look}{every}" if looks else ""))
 
     def _mass(self, name: str) -> float:
-        """Of a particle of a material; the largest one's where they differ [kg]."""
+        """Of a particle of a material: they are of one size, as linear laws need it [kg]."""
         sim = self.sim
         kind = self.names.index(name)
         radii = [float(sim.radii[sim.kinds == kind].max(initial=0.0))]
