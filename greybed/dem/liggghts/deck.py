@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -109,7 +110,7 @@ class _Writer:
         times = {0, self.run.steps} | {step for w in self.walls for step in self._times(w)}
         times |= {self._look_at(t) for t in self._sources().values()}
         stops = sorted(int(t) for t in times if t <= self.run.steps)
-        for step, end in zip(stops[:-1], stops[1:], strict=True):
+        for step, end in itertools.pairwise(stops):
             self._change(step)
             self._stretch(end - step)
         # The end as it is, whatever the steps between two dumps.

@@ -41,12 +41,12 @@ def check(case: ParticleCase) -> None:
         if isinstance(table, StressTable | ConductionTable):
             raise _cannot(f"measure {table.name!r}, which needs the force of each contact", _REMEDY)
     for number, source in enumerate(case.particles):
-        if not isinstance(source, FileTable) and source.shape is not None:
-            if case.effects.particle_shape:
-                raise _cannot(
-                    f"particles[{number}].shape = {source.shape!r}",
-                    f"{_REMEDY}, or spheres of the same volume with effects.particle_shape = false",
-                )
+        shape = None if isinstance(source, FileTable) else source.shape
+        if shape is not None and case.effects.particle_shape:
+            raise _cannot(
+                f"particles[{number}].shape = {shape!r}",
+                f"{_REMEDY}, or spheres of the same volume with effects.particle_shape = false",
+            )
     _check_numbers(case)
     _check_walls(case)
     if law.normal == "linear":

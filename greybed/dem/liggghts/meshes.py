@@ -60,7 +60,7 @@ def triangles(shape: Wall, box: Array, smallest: float) -> Array:
         _ring(point + s * length * axis, axis, (1.0 - s) * first + s * last, count) for s in share
     ]
     parts = []
-    for low, high in zip(loops[:-1], loops[1:], strict=True):
+    for low, high in itertools.pairwise(loops):
         after_low, after_high = np.roll(low, -1, axis=0), np.roll(high, -1, axis=0)
         parts += [np.stack([low, after_low, after_high], 1), np.stack([low, after_high, high], 1)]
     found = np.concatenate(parts)
