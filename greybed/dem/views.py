@@ -108,13 +108,17 @@ class Views:
 
     @property
     def forces(self) -> Array:
-        """Contact forces without gravity, shape (n, 3) [N]."""
-        return self._in_order(self._state.load[:, :3])
+        """Contact forces without gravity and pushes, shape (n, 3) [N]."""
+        return self._in_order(self._contact_loads()[:, :3])
 
     @property
     def torques(self) -> Array:
-        """Contact torques, shape (n, 3) [N m]."""
-        return self._in_order(self._state.load[:, 3:6])
+        """Contact torques without pushes, shape (n, 3) [N m]."""
+        return self._in_order(self._contact_loads()[:, 3:])
+
+    def _contact_loads(self) -> Array:
+        load, outer = self._state.load[:, :6], self._state.outer
+        return load - outer if len(outer) else load
 
     @property
     def wall_forces(self) -> Array:
