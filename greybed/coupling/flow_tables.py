@@ -30,9 +30,7 @@ class GridTable:
     def grid(self) -> Grid:
         """The grid itself."""
         x, y, z = (axis in self.periodic for axis in AXES)
-        return Grid(
-            cells=self.cells, lower=self.lower, upper=self.upper, periodic=(x, y, z)
-        )
+        return Grid(cells=self.cells, lower=self.lower, upper=self.upper, periodic=(x, y, z))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -39,9 +39,7 @@ def write_grid_part(
     names = [name.replace("/", " per ") for name in fields]
     arrays = {f"field_{k}": np.asarray(a, np.float32) for k, a in enumerate(fields.values())}
     with atomic_path(path) as part, open(part, "wb") as stream:
-        np.savez(
-            stream, allow_pickle=False, time=np.array(time), names=np.array(names), **arrays
-        )
+        np.savez(stream, allow_pickle=False, time=np.array(time), names=np.array(names), **arrays)
     return Path(path)
 
 
