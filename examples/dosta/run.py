@@ -104,10 +104,10 @@ def silo_sample(run: ParticleRun) -> Row:
     lip = next(wall for wall in run.case.wall if wall.name == "hopper").wall().point[2]
     sim = run.simulation
     above = sim.centres[:, 2] > lip
-    squares = (sim.velocities[above] ** 2).sum(axis=1)
+    squares = (sim.velocities[above] ** 2).sum()
     return {
         "above": float(above.sum()),
-        "agitation": float(squares.mean() / (2.0 * 9.81 * 2.0 * sim.radii[0])),
+        "agitation": float(squares / max(above.sum(), 1) / (2.0 * 9.81 * 2.0 * sim.radii[0])),
     }
 
 
