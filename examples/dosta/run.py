@@ -139,17 +139,19 @@ def impact_sample(run: ParticleRun) -> Row:
 
 
 def flow(rows: list[Row], start: float, first: float = 0.3) -> dict[str, float]:
-    """Rate of discharge [1/s]: slope of the number above the lip, and that of its tenths.
+    """Rate of discharge [1/s]: slope of the number above the lip, and its error.
 
     The window begins ``first`` after the opening [s] and ends with the run; the standard error is
-    that of the mean of the slopes over tenths of a second.
+    that of the mean of the slopes over parts of 50 ms.
     """
     t = np.array([row["time"] - start for row in rows])
     n = np.array([row["above"] for row in rows])
     used = t > first - 1e-9
+    if used.sum() < 3:
+        raise ValueError("the window of the rate has not begun")
     slope = -float(np.polyfit(t[used], n[used], 1)[0])
-    edges = np.arange(first, t[-1] + 1e-9, 0.1)
-    parts = -np.diff(np.interp(edges, t, n)) / 0.1
+    edges = np.arange(first, t[-1] + 1e-9, 0.05)
+    parts = -np.diff(np.interp(edges, t, n)) / 0.05
     error = float(parts.std(ddof=1) / math.sqrt(len(parts))) if len(parts) > 1 else math.nan
     return {
         "rate": slope, "rate_error": error, "window_from": first, "window_to": float(t[-1]),
