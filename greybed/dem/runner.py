@@ -90,7 +90,7 @@ class ParticleRun:
             x, r, self._materials, case.contacts(used), kinds=kind, kinds_to_come=len(used),
             law=case.contact_law, walls=case.walls, gravity=case.gravity, time_step=step,
             velocities=v, clumps=[batch.clumps for batch in batches if batch.shape is not None],
-            most_overlap=case.most_overlap, threads=threads,
+            most_overlap=case.most_overlap, threads=threads, skin=case.skin,
             box=None if periodic is None else [periodic.lower, periodic.upper],
             periodic=(False,) * 3 if periodic is None
             else ("x" in periodic.axes, "y" in periodic.axes, "z" in periodic.axes),
