@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,8 +20,9 @@ Faces = tuple[Array, Array, Array]
 
 # Explicit convection: cells crossed in a step, summed over the axes.
 _COURANT = 0.5
-# Share of the limit of stability of explicit viscosity: a half for Adams-Bashforth, and some room.
-_VISCOUS = 0.4
+# Share of the limit of stability of explicit viscosity; half of it for Adams and Bashforth.
+_VISCOUS, _ADAMS = 0.8, 0.5
+_MOST_STAGES = 99
 
 
 class TooLong(Exception):
@@ -43,30 +46,49 @@ class Part:
         courant = self.crossings(s.velocity) * dt
         if courant > 1.01 * _COURANT:
             raise TooLong(f"gas crosses {courant:.2g} cells at {self._fastest(s.velocity)}.")
-        if dt > 1.01 * self.viscous_limit(s):
-            raise TooLong("viscosity spreads over more than a cell.")
         flux = _products(project.mass_on_faces(s.mass, s.void_fraction), s.velocity)
-        eps = sides.cells(s.void_fraction)
-        now = forces.transport(sides, s.velocity, flux, self.fluid.viscosity * eps)
-        a, b, before = 1.0, 0.0, now
-        if s.rates is not None:
-            a, b, before = 1.0 + 0.5 * dt / s.before, -0.5 * dt / s.before, s.rates
+        convection = forces.convection(sides, s.velocity, flux)
+        friction = self._friction(s, s.velocity, flux)
+        a, b = 1.0, 0.0
+        if s.convection is not None and s.friction is not None:
+            a, b = 1.0 + 0.5 * dt / s.before, -0.5 * dt / s.before
+        stages = self._stages(s, dt)
         mass, growth = self._masses(s, dt, given, flux)
         faces = project.mass_on_faces(mass, given.void)
         shares = self._shares(given.void)
         slope = forces.slopes(sides, s.pressure)
         star = [np.empty(shape) for shape in grid.face_shapes]
         gain = [np.empty(shape) for shape in grid.face_shapes]
-        for axis in range(3):
-            arrays = (
-                faces[axis], shares[axis], slope[axis] + s.gradient[axis], given.drag[axis],
-                given.target[axis], given.source[axis],
-            )  # fmt: skip
-            _momentum.predict(
-                s.velocity[axis].ravel(), now[axis].ravel(), before[axis].ravel(), a, b,
-                *(x.ravel() for x in arrays), given.gravity[axis], dt, star[axis].ravel(),
-                gain[axis].ravel(),
-            )  # fmt: skip
+        rate = [a * c for c in convection]
+        if s.convection is not None and s.friction is not None:
+            for axis in range(3):
+                rate[axis] += b * s.convection[axis]
+                if stages == 1:
+                    rate[axis] += b * s.friction[axis]
+        if stages == 1:
+            for axis in range(3):
+                rate[axis] += a * friction[axis]
+        push = [slope[axis] + s.gradient[axis] for axis in range(3)]
+
+        def predict() -> None:
+            for axis in range(3):
+                arrays = (
+                    s.velocity[axis], rate[axis], faces[axis], shares[axis], push[axis],
+                    given.drag[axis], given.target[axis], given.source[axis],
+                )  # fmt: skip
+                _momentum.predict(
+                    *(x.ravel() for x in arrays), given.gravity[axis], dt,
+                    star[axis].ravel(), gain[axis].ravel(),
+                )  # fmt: skip
+
+        predict()
+        if stages > 1:
+            whole = [m / dt + d for m, d in zip(faces, given.drag, strict=True)]
+            smeared = self._smear(s, (star[0], star[1], star[2]), whole, friction, flux, stages,
+                                  given.void)  # fmt: skip
+            for axis in range(3):
+                rate[axis] += whole[axis] * (smeared[axis] - star[axis])
+            predict()
         velocity: Faces = (star[0], star[1], star[2])
         project.hold_rims(velocity, given.void)
         project.close_rims(gain)
@@ -94,11 +116,11 @@ class Part:
             )  # fmt: skip
             tally.heat = share * heat + (0.0 if tally.heat is None else tally.heat)
         new = Gas(
-            velocity, s.pressure + p, given.void, mass, temperature, s.time + dt, gradient, now, dt
-        )
+            velocity, s.pressure + p, given.void, mass, temperature, s.time + dt, gradient,
+            convection, friction, dt,
+        )  # fmt: skip
         if self.budget:
-            transport = [a * n + b * o for n, o in zip(now, before, strict=True)]
-            self._account(tally.budget, s, new, given, transport, flux, shares)
+            self._account(tally.budget, s, new, given, rate, flux, shares)
         if tally.seen is None:
             tally.seen = [share * u for u in velocity]
         else:
@@ -110,6 +132,52 @@ class Part:
         tally.courant = max(tally.courant, courant)
         tally.imbalance += share * imbalance
         return new
+
+    def _friction(self, s: Gas, velocity: Faces, flux: Faces) -> Faces:
+        if self.fluid.viscosity == 0.0:
+            x, y, z = (np.zeros(u.shape) for u in velocity)
+            return x, y, z
+        viscosity = self.fluid.viscosity * self.sides.cells(s.void_fraction)
+        return forces.friction(self.sides, velocity, flux, viscosity)
+
+    def _stages(self, s: Gas, dt: float) -> int:
+        """1 for Adams and Bashforth; an odd number for Runge, Kutta and Legendre."""
+        limit = self.viscous_limit(s)
+        if dt <= _ADAMS * limit:
+            return 1
+        least = math.ceil(0.5 * (math.sqrt(1.0 + 8.0 * dt / limit) - 1.0))
+        stages = max(3, least + 1 - least % 2)
+        if stages > _MOST_STAGES:
+            raise TooLong(f"viscosity takes {stages} stages, more than {_MOST_STAGES}.")
+        return stages
+
+    def _smear(
+        self, s: Gas, free: Faces, whole: list[Array], friction: Faces, flux: Faces, stages: int,
+        void: Array,
+    ) -> list[Array]:  # fmt: skip
+        """Velocities with viscosity from those without, by Runge, Kutta and Legendre's method.
+
+        Meyer, Balsara & Aslam, Mon. Not. R. Astron. Soc. 422 (2012) 2102, first order. All other
+        forces are constant in the stages, with the inertia that implicit drag leaves: a steady
+        flow stays as it is whatever the length of the step.
+        """
+        force = [w * (f - u) for w, f, u in zip(whole, free, s.velocity, strict=True)]
+        factor = 2.0 / (stages**2 + stages)
+        older = list(s.velocity)
+        rate = list(friction)
+        newer = [u + factor * (r + f) / w
+                 for u, r, f, w in zip(older, rate, force, whole, strict=True)]  # fmt: skip
+        for j in range(2, stages + 1):
+            held: Faces = (newer[0], newer[1], newer[2])
+            self._projection.hold_rims(held, void)
+            rate = list(self._friction(s, held, flux))
+            mu, nu = (2.0 * j - 1.0) / j, (1.0 - j) / j
+            newest = [
+                mu * y + nu * x + mu * factor * (r + f) / w
+                for y, x, r, f, w in zip(newer, older, rate, force, whole, strict=True)
+            ]
+            older, newer = newer, newest
+        return newer
 
     def _masses(self, s: Gas, dt: float, given: Inputs, flux: Faces) -> tuple[Array, Array]:
         """Mass of gas per volume after the step and its rate.
