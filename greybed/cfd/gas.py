@@ -202,7 +202,7 @@ class GasSolver:
         out = {
             "pressure": s.pressure, "void_fraction": s.void_fraction, "mass": s.mass,
             "temperature": s.temperature, "gradient": s.gradient,
-            "times": np.array([s.time, s.before]),
+            "times": np.array([s.time, s.before]), "spilled": s.spilled,
         }  # fmt: skip
         for axis, name in enumerate("uvw"):
             out[name] = s.velocity[axis]
@@ -230,7 +230,19 @@ class GasSolver:
         time, before = (float(t) for t in saved["times"])
         gradient = np.array(saved["gradient"], dtype=np.float64)
         p, eps, mass, t = cells
-        self.state = Gas((u, v, w), p, eps, mass, t, time, gradient, kept[0], kept[1], before)
+        self.state = Gas(
+            (u, v, w),
+            p,
+            eps,
+            mass,
+            t,
+            time,
+            gradient,
+            kept[0],
+            kept[1],
+            before,
+            np.array(saved["spilled"]),
+        )
 
     # -- a step -----------------------------------------------------------------------------
 

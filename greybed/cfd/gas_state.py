@@ -32,6 +32,8 @@ class Gas:
     convection, friction : three arrays or None
         What convection and viscosity did in the step before [N m-3], whose length was ``before``
         [s].
+    spilled : array, shape (3,)
+        Momentum per time that convection then left to the lag of the budget [N].
     """
 
     velocity: Faces
@@ -44,6 +46,7 @@ class Gas:
     convection: Faces | None = None
     friction: Faces | None = None
     before: float = 0.0
+    spilled: Array = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True, eq=False)

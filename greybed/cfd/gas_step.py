@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +21,8 @@ Faces = tuple[Array, Array, Array]
 
 # Explicit convection: cells crossed in a step, summed over the axes.
 _COURANT = 0.5
-# Share of the limit of stability of explicit viscosity; half of it for Adams and Bashforth.
-_VISCOUS, _ADAMS = 0.8, 0.5
+# Share of the limit of stability of explicit viscosity.
+_VISCOUS = 0.8
 _MOST_STAGES = 99
 
 
@@ -52,7 +53,7 @@ class Part:
         a, b = 1.0, 0.0
         if s.convection is not None and s.friction is not None:
             a, b = 1.0 + 0.5 * dt / s.before, -0.5 * dt / s.before
-        stages = self._stages(s, dt)
+        stages = self._stages(s, dt, courant)
         mass, growth = self._masses(s, dt, given, flux)
         faces = project.mass_on_faces(mass, given.void)
         shares = self._shares(given.void)
@@ -120,7 +121,7 @@ class Part:
             convection, friction, dt,
         )  # fmt: skip
         if self.budget:
-            self._account(tally.budget, s, new, given, rate, flux, shares)
+            new = self._account(tally.budget, s, new, given, rate, flux, shares, (a, b))
         if tally.seen is None:
             tally.seen = [share * u for u in velocity]
         else:
@@ -140,12 +141,14 @@ class Part:
         viscosity = self.fluid.viscosity * self.sides.cells(s.void_fraction)
         return forces.friction(self.sides, velocity, flux, viscosity)
 
-    def _stages(self, s: Gas, dt: float) -> int:
+    def _stages(self, s: Gas, dt: float, courant: float) -> int:
         """1 for Adams and Bashforth; an odd number for Runge, Kutta and Legendre."""
-        limit = self.viscous_limit(s)
-        if dt <= _ADAMS * limit:
+        share = dt / self.viscous_limit(s)
+        # Adams and Bashforth end where the fastest mode decays by 1 per step: twice the cells
+        # crossed from convection, and twice the share of the plain limit from viscosity.
+        if 2.0 * courant + 2.0 * _VISCOUS * share <= 1.0 or self.fluid.viscosity == 0.0:
             return 1
-        least = math.ceil(0.5 * (math.sqrt(1.0 + 8.0 * dt / limit) - 1.0))
+        least = math.ceil(0.5 * (math.sqrt(9.0 + 16.0 * share) - 1.0))
         stages = max(3, least + 1 - least % 2)
         if stages > _MOST_STAGES:
             raise TooLong(f"viscosity takes {stages} stages, more than {_MOST_STAGES}.")
@@ -157,24 +160,29 @@ class Part:
     ) -> list[Array]:  # fmt: skip
         """Velocities with viscosity from those without, by Runge, Kutta and Legendre's method.
 
-        Meyer, Balsara & Aslam, Mon. Not. R. Astron. Soc. 422 (2012) 2102, first order. All other
+        Meyer, Balsara & Aslam, Mon. Not. R. Astron. Soc. 422 (2012) 2102, second order. All other
         forces are constant in the stages, with the inertia that implicit drag leaves: a steady
         flow stays as it is whatever the length of the step.
         """
         force = [w * (f - u) for w, f, u in zip(whole, free, s.velocity, strict=True)]
-        factor = 2.0 / (stages**2 + stages)
+        first = [(r + f) / w for r, f, w in zip(friction, force, whole, strict=True)]
+        width = 4.0 / (stages**2 + stages - 2.0)
+        b = [1.0 / 3.0] * 2 + [
+            (j * j + j - 2.0) / (2.0 * j * (j + 1.0)) for j in range(2, stages + 1)
+        ]
         older = list(s.velocity)
-        rate = list(friction)
-        newer = [u + factor * (r + f) / w
-                 for u, r, f, w in zip(older, rate, force, whole, strict=True)]  # fmt: skip
+        newer = [u + width / 3.0 * r for u, r in zip(older, first, strict=True)]
         for j in range(2, stages + 1):
             held: Faces = (newer[0], newer[1], newer[2])
             self._projection.hold_rims(held, void)
-            rate = list(self._friction(s, held, flux))
-            mu, nu = (2.0 * j - 1.0) / j, (1.0 - j) / j
+            rate = self._friction(s, held, flux)
+            mu, nu = (2.0 * j - 1.0) / j * b[j] / b[j - 1], (1.0 - j) / j * b[j] / b[j - 2]
+            new, old = mu * width, -(1.0 - b[j - 1]) * mu * width
             newest = [
-                mu * y + nu * x + mu * factor * (r + f) / w
-                for y, x, r, f, w in zip(newer, older, rate, force, whole, strict=True)
+                mu * y + nu * x + (1.0 - mu - nu) * u + new * (r + f) / w + old * r0
+                for y, x, u, r, f, w, r0 in zip(
+                    newer, older, s.velocity, rate, force, whole, first, strict=True
+                )
             ]
             older, newer = newer, newest
         return newer
@@ -205,29 +213,39 @@ class Part:
 
     def _account(
         self, sums: list[Array], s: Gas, new: Gas, given: Inputs, transport: list[Array],
-        flux: Faces, shares: Faces,
-    ) -> None:  # fmt: skip
-        """Add the budget of momentum of a part."""
+        flux: Faces, shares: Faces, weights: tuple[float, float],
+    ) -> Gas:  # fmt: skip
+        """Add the budget of momentum of a part; the state with what the next one needs for it."""
         project, dt, volume = self._projection, new.before, self.grid.cell_volume
         old, now = (project.mass_on_faces(x.mass, x.void_fraction) for x in (s, new))
         slope = forces.slopes(self.sides, new.pressure)
         spill = self.sides.cells(forces.outflow(self.sides, flux))
+        spilled = np.zeros(3)
         for axis in range(3):
             u, v = s.velocity[axis], new.velocity[axis]
             lost = forces.on_faces(self.sides, spill, axis) * u  # u div F, which convection leaves
             parts = (
                 now[axis] * v - old[axis] * u,
-                dt * (transport[axis] - lost),
+                dt * transport[axis],
                 -dt * shares[axis] * (slope[axis] + new.gradient[axis]),
                 -dt * given.drag[axis] * (v - given.target[axis]),
                 dt * given.source[axis],
                 dt * now[axis] * given.gravity[axis],
-                (now[axis] - old[axis]) * u + dt * lost,
+                (now[axis] - old[axis]) * u,
+                lost,
             )
             periodic = self.grid.periodic[axis]
-            for total, part in zip(sums, parts, strict=True):
-                inside = lead(part, axis)[1 : None if periodic else -1]
-                total[axis] += volume * float(inside.sum())
+            found = [
+                volume * float(lead(part, axis)[1 : None if periodic else -1].sum())
+                for part in parts
+            ]
+            spilled[axis] = found.pop()
+            left = dt * (weights[0] * spilled[axis] + weights[1] * s.spilled[axis])
+            found[1] -= left
+            found[6] += left
+            for total, amount in zip(sums, found, strict=True):
+                total[axis] += amount
+        return replace(new, spilled=spilled)
 
     # -- checks and limits ------------------------------------------------------------------
 
