@@ -121,6 +121,7 @@ class GasParticles:
         self.steps = 0
         self._passed = 0.0  # length of the last step [s]
         self.gas_report: Any = None  # of the last step
+        self._rate: float | None = None
         self._seen: Array | None = None  # gas velocity at the particles, by label
         self._overlaps = self._look()
         self.void, self.least_void, self.limited = self._void_of(self._overlaps)
@@ -155,11 +156,11 @@ class GasParticles:
         limit = courant / max(fastest, 1e-300) / self.simulation.time_step
         steps = min(self.steps_at_most(), most, int(min(limit, 1e9)))
         if self.settings.treatment != "implicit":
-            terms = self._terms(self._overlaps, self._read(self.gas.velocity))
-            mass = self.simulation._state.motion[:, 6]
-            rate = float((terms.coefficient / mass).max(initial=0.0)) * self.simulation.time_step
+            if self._rate is None:
+                self._note(self._terms(self._overlaps, self._read(self.gas.velocity)))
             # Half a relaxation time: the force is of the velocity at the start.
-            steps = min(steps, int(min(0.5 / max(rate, 1e-300), 1e9)))
+            rate = max(self._rate or 0.0, 1e-300) * self.simulation.time_step
+            steps = min(steps, int(min(0.5 / rate, 1e9)))
         return max(1, steps)
 
     def step(self, steps: int | None = None) -> ExchangeReport:
@@ -183,6 +184,7 @@ class GasParticles:
         mass = sim._state.motion[:, 6]
         seen = self._read(gas.velocity)
         terms = self._terms(overlaps, seen)
+        self._note(terms)
         steady = self._steady(overlaps, terms, seen, dt)
         k, target = self._linear(terms, seen, dt)
         place = sim._state.place
@@ -267,6 +269,11 @@ class GasParticles:
     def _read(self, velocity: Faces) -> Array:
         return self.transfer.read(velocity, self.simulation._state.place)
 
+    def _note(self, terms: DragTerms) -> None:
+        """Keep the fastest relaxation of a particle [1/s], for the length of the next step."""
+        mass = self.simulation._state.motion[:, 6]
+        self._rate = float((terms.coefficient / mass).max(initial=0.0))
+
     def _terms(self, overlaps: Overlaps, seen: Array) -> DragTerms:
         state, fluid = self.simulation._state, self.gas.fluid
         void = overlaps.mean(self.void[..., None])[:, 0]
@@ -347,8 +354,11 @@ class GasParticles:
     def state(self) -> dict[str, Array]:
         """What goes beside the states of gas and particles."""
         seen = np.zeros((0, 3)) if self._seen is None else self._seen
+        rate = -1.0 if self._rate is None else self._rate
         return {"coupling_void": self.void, "coupling_seen": seen,
-                "coupling_clock": np.array([self.time, float(self.steps), self._passed])}  # fmt: skip
+                "coupling_clock": np.array(
+                    [self.time, float(self.steps), rate, self._passed]
+                )}  # fmt: skip
 
     def go_back(self, state: Mapping[str, Any]) -> None:
         """Take up what :meth:`state` has given, after gas and particles have been restored.
@@ -361,9 +371,12 @@ class GasParticles:
         try:
             self.void = np.array(state["coupling_void"])
             seen = np.array(state["coupling_seen"])
-            self.time, steps, self._passed = (float(value) for value in state["coupling_clock"])
+            self.time, steps, rate, self._passed = (
+                float(value) for value in state["coupling_clock"]
+            )
         except KeyError:
             raise InputError("this checkpoint holds no gas; give the case that wrote it.") from None
         self._seen = seen if len(seen) else None
+        self._rate = None if rate < 0.0 else rate
         self.steps = int(steps)
         self._overlaps = self._look()
