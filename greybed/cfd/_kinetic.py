@@ -94,13 +94,13 @@ def factors(phi, g, e):
 @njit(**_OPTIONS)
 def closures(
     phi, square, dilation, gamma, density, d, e, packing, onset, scale, growth, power, sine,
-    fixed, drag_loss, most, theta, shear, second, friction,
+    fixed, drag_loss, most, size, theta, shear, second, friction,
 ):  # fmt: skip
     """Granular temperature, kinematic viscosities of collisions, and that of friction.
 
     ``square`` is twice the squared rates of strain. Kinematic means over density and phi;
     ``second`` is bulk less two thirds of shear. ``fixed`` below 0: temperature from production =
-    dissipation, J sqrt(theta)^2 / d + (K dilation + 3 gamma eps / density) sqrt(theta) = C.
+    dissipation, J theta / d + (3 gamma eps / density) sqrt(theta) = what viscosities make.
     """
     for i in range(phi.size):
         x = min(max(phi[i], 0.0), packing)
@@ -111,22 +111,14 @@ def closures(
         if fixed >= 0.0:
             t = fixed
         else:
-            # All three over phi: finite where there are no particles.
-            k = 1.0 + 2.0 * (1.0 + e) * x * g
-            middle = k * trace
-            if drag_loss:
-                middle += 3.0 * gamma[i] * (1.0 - x) / density
+            # Both over phi: finite where there are no particles.
             loss = j * (x + 1e-4) / d
             make = d * (m * deviator + bulk * trace * trace)
+            middle = 3.0 * gamma[i] * (1.0 - x) / density if drag_loss else 0.0
             root = math.sqrt(middle * middle + 4.0 * loss * make)
-            # The form without cancellation on either side.
-            if middle > 0.0:
-                speed = 2.0 * make / (middle + root) if root > 0.0 else 0.0
-            elif loss > 0.0:
-                speed = (root - middle) / (2.0 * loss)
-            else:
-                speed = math.sqrt(most)
-            t = min(speed * speed, most)
+            speed = 2.0 * make / (middle + root) if make > 0.0 else 0.0
+            # No more than differs over a cell: free paths of dilute cells are longer than they.
+            t = min(speed * speed, most, size * size * (deviator + trace * trace))
         theta[i] = t
         lively = d * math.sqrt(t)
         shear[i] = m * lively

@@ -149,7 +149,12 @@ class Poisson:
             _multigrid.sweep(level.p, level.b, *faces, colour)
 
     def solve(
-        self, outflow: Array, start: Array | None = None, *, tolerance: float = 1e-8
+        self,
+        outflow: Array,
+        start: Array | None = None,
+        *,
+        tolerance: float = 1e-8,
+        enough: float = 0.0,
     ) -> tuple[Array, int]:
         """Values of the cells.
 
@@ -161,6 +166,8 @@ class Poisson:
             First guess; 0 by default.
         tolerance : float
             Largest norm of the residual over that of ``outflow`` [-].
+        enough : float
+            A norm of the residual that is small enough anyhow.
 
         Returns
         -------
@@ -182,7 +189,7 @@ class Poisson:
         r = b - work
         direction, old = np.zeros_like(b), 1.0
         for iteration in range(_MOST_ITERATIONS + 1):
-            if float(np.sqrt((r**2).sum())) <= tolerance * size:
+            if float(np.sqrt((r**2).sum())) <= max(tolerance * size, enough):
                 return (p - p.mean() if self.singular else p), iteration
             top.b[...] = r
             self._cycle(0)

@@ -194,22 +194,32 @@ class Rims:
             if isinstance(side, Inflow):
                 n, at = self.grid.cells[face], BEFORE + self.grid.cells[face] * end
                 flux = side.gas * (1 - 2 * end)
-                self.along(volume, face)[at] = flux
+                ghosts = slice(0, at + 1) if end == 0 else slice(at, None)
+                self.along(volume, face)[ghosts] = flux
                 solid = self.along(phi, face)[min(at, BEFORE + n - 1)]
                 self.along(gas, face)[at] = flux / (1.0 - solid)
 
     def fluxes(self, flat: Array, face: int, closed: bool) -> None:
-        """A flux or mobility across ``face``: repeated; nothing through what is no outlet.
+        """A flux or mobility across ``face``: nothing passes a side that is no outlet.
 
-        ``closed`` leaves nothing through outlets either.
+        ``closed`` leaves nothing through outlets either. Beside the grid it goes on as it is.
         """
-        box, n = self.along(flat, face), self.grid.cells[face]
-        if self.grid.periodic[face]:
-            self._repeat(box, n)
-            return
-        for end in (0, 1):
-            if closed or not isinstance(self.sides[face, end], Outlet):
-                box[BEFORE + n * end] = 0.0
+        for a in self.axes:
+            box, n = self.along(flat, a), self.grid.cells[a]
+            if self.grid.periodic[a]:
+                self._repeat(box, n)
+                continue
+            for end in (0, 1):
+                if a != face:
+                    self._mirror(box, n, end, 1.0)
+                    continue
+                at = BEFORE + n * end
+                if closed or not isinstance(self.sides[a, end], Outlet):
+                    box[at] = 0.0
+                if end == 0:
+                    box[:at] = box[at]
+                else:
+                    box[at + 1 :] = box[at]
 
     def repeat_cells(self, flat: Array) -> None:
         """Values of cells along the axes that repeat only."""

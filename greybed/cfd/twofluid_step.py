@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -168,7 +167,7 @@ class Stepper:
     def exchange(self, state: State) -> list[Array]:
         """Drag over phi and eps [kg m-3 s-1] in the cells: one array, or one for each axis."""
         rims, f = self.rims, self.fluids
-        square = self.array("slip2")
+        square = self.array("slip_square")
         parts = [self.array(f"slip{a}") for a in range(3)]
         for k, a in enumerate(self.axes):
             _twofluid.slip(state.ug[a], state.us[a], rims.strides[a], k == 0, parts[a], square)
@@ -217,7 +216,7 @@ class Stepper:
             state.phi, square, dilation, gamma, f.density, f.diameter, *g.pressure_numbers,
             math.sin(math.radians(g.friction_angle)),
             -1.0 if g.temperature is None else g.temperature, g.drag_dissipation,
-            g.highest_temperature, self.array("theta"), self.array("shear"), self.array("second"),
+            g.highest_temperature, self.size, self.array("theta"), self.array("shear"), self.array("second"),
             self.array("friction"),
         )  # fmt: skip
         for name in ("theta", "shear", "second", "friction"):

@@ -15,8 +15,11 @@ if TYPE_CHECKING:
 CHECKPOINT = "checkpoint.npz"
 
 
-def run_particles(options: argparse.Namespace) -> int:
-    """Run the case that ``options`` names, from its checkpoint if there is one; returns 0."""
+def run_particles(options: argparse.Namespace, *, gas: bool = False) -> int:
+    """Run the case that ``options`` names, from its checkpoint if there is one; returns 0.
+
+    With ``gas`` it is one of particles in a gas.
+    """
     from greybed.core.errors import InputError
     from greybed.core.files import output_folder, sha256_of, sole_writer
     from greybed.core.progress import progress
@@ -26,7 +29,17 @@ def run_particles(options: argparse.Namespace) -> int:
     from greybed.dem.results import results_of
     from greybed.dem.runner import ParticleRun
 
-    case = load_particle_case(options.case)
+    case: Any
+    kind: Any
+    if gas:
+        from greybed.cli.gas_frames import GasFrames
+        from greybed.coupling.gas_particles_case import load_gas_particles_case
+        from greybed.coupling.gas_particles_run import GasParticlesRun
+
+        case, kind = load_gas_particles_case(options.case), GasParticlesRun
+        shown: type[Frames] = GasFrames
+    else:
+        case, kind, shown = load_particle_case(options.case), ParticleRun, Frames
     files, inputs = files_of(case, options.case)
     key = "".join(sha256_of(path) for path in inputs)
     folder = output_folder(options.out)
@@ -34,7 +47,7 @@ def run_particles(options: argparse.Namespace) -> int:
     with sole_writer(folder / ".simulate.lock"):
         packings = {k: read_packing(path) for k, path in files.items()}
         try:
-            run = ParticleRun(case, packings, threads=options.threads)
+            run = kind(case, packings, threads=options.threads)
         except InputError as error:
             raise InputError(f"{options.case}: {error}") from None
         found = 0
@@ -42,10 +55,11 @@ def run_particles(options: argparse.Namespace) -> int:
         if kept is not None and kept.get("key") == key:
             run.restore(checkpoint)
             found = run.simulation.steps
-        frames = Frames(run, folder, options.movie)
+        frames = shown(run, folder, options.movie)
         every = case.output.checkpoints or 0.1 * case.duration
         apart = max(1, round(every / run.simulation.time_step))
         begin, moved = time.perf_counter(), 0
+        gas_steps = run.totals["gas steps"] if gas else 0
         with progress(run.steps, "time steps", show=not options.quiet) as advance:
             advance(found)
             if not found:
@@ -75,11 +89,15 @@ def run_particles(options: argparse.Namespace) -> int:
         seconds = time.perf_counter() - begin
         results: dict[str, Any] = {
             **results_of(run),
+            **(run.gas_results() if gas else {}),
             "steps_found_from_stopped_run": found,
             "seconds": seconds,
             "particle_steps_per_second": moved / seconds if moved else None,
             "threads": run.simulation.threads,
         }
+        if gas:
+            rate = results["gas"]["cells"] * (run.totals["gas steps"] - gas_steps) / seconds
+            results["cell_steps_per_second"] = rate or None
         summary = write_results(folder, run, frames, results, inputs)
     if found:
         print(f"went on from a stopped run at step {found}")

@@ -73,7 +73,8 @@ class Overlaps:
 
     def solids(self) -> Array:
         """Volumes in the cells, shape (nz, ny, nx) [m3]."""
-        out = np.bincount(self.cell, self.volume, minlength=int(np.prod(self.grid.shape)))
+        cells = int(np.prod(self.grid.shape))
+        out: Array = np.bincount(self.cell, self.volume, minlength=cells).astype(np.float64)
         return out.reshape(self.grid.shape)
 
     def integral(self, fields: Array) -> Array:

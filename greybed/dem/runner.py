@@ -90,7 +90,7 @@ class ParticleRun:
             x, r, self._materials, case.contacts(used), kinds=kind, kinds_to_come=len(used),
             law=case.contact_law, walls=case.walls, gravity=case.gravity, time_step=step,
             velocities=v, clumps=[batch.clumps for batch in batches if batch.shape is not None],
-            most_overlap=case.most_overlap, threads=threads,
+            most_overlap=case.most_overlap, threads=threads, skin=case.skin,
             box=None if periodic is None else [periodic.lower, periodic.upper],
             periodic=(False,) * 3 if periodic is None
             else ("x" in periodic.axes, "y" in periodic.axes, "z" in periodic.axes),
@@ -128,11 +128,15 @@ class ParticleRun:
                 return
             stop = min(end, (before // self.look + 1) * self.look)
             stop = min(stop, (before // self._sample + 1) * self._sample)
-            sim.run(stop - before)
+            self._move(stop - before)
             self._warm()
             if sim.steps % self._sample == 0 or sim.steps == self.steps:
                 self._note()
             yield sim.steps - before
+
+    def _move(self, steps: int) -> None:
+        """Let the particles run; what else moves with them is the affair of other runs."""
+        self.simulation.run(steps)
 
     def _warm(self) -> None:
         """Let heat catch up, at looks and at the end only: a stop between them changes no bit."""
@@ -226,8 +230,16 @@ class ParticleRun:
 
     def save(self, path: str | os.PathLike[str], **extra: Any) -> Path:
         """Write a checkpoint, with the tallies and what else is given."""
-        heat = None if self.heat is None else self.heat.state()
-        return save(self.simulation, path, beside=heat, tally=vars(self.tally), **extra)
+        return save(self.simulation, path, beside=self._beside(), tally=vars(self.tally), **extra)
+
+    def _beside(self) -> dict[str, NDArray[Any]]:
+        """Arrays that go into a checkpoint beside the particles."""
+        return {} if self.heat is None else dict(self.heat.state())
+
+    def _take_up(self, beside: dict[str, NDArray[Any]]) -> None:
+        """Take up what :meth:`_beside` has given."""
+        if self.heat is not None:
+            self.heat.go_back(beside)
 
     def restore(self, path: str | os.PathLike[str]) -> dict[str, Any]:
         """Go back to a checkpoint; returns what else was given to :meth:`save`."""
@@ -235,9 +247,7 @@ class ParticleRun:
         self.tally = Tally(**extra.pop("tally"))
         self.feed.streamed, self.feed.inserted = self.tally.streamed, self.tally.inserted
         self.feed.batches = self.tally.batches
-        beside = extra.pop("beside", {})
-        if self.heat is not None:
-            self.heat.go_back(beside)
+        self._take_up(extra.pop("beside", {}))
         return extra
 
 
