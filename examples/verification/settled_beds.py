@@ -4,8 +4,8 @@
 
 Spheres of 1.7 to 2.3 mm (radii) fall into a box and come to rest, with greybed and with LIGGGHTS
 (which must be installed), from the same random places for each seed. Writes settled_beds.json and
-settled_beds.png; the recorded ones are in examples/verification/results. About ten minutes for the
-defaults on one busy core.
+settled_beds.png; the recorded ones are examples/verification/results/settled_beds.json and
+docs/images/settled_beds.png. About ten minutes for the defaults on half a core.
 """
 
 from __future__ import annotations
@@ -151,7 +151,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--count", type=int, default=2000)
     parser.add_argument("--seeds", type=int, default=6)
-    parser.add_argument("--duration", type=float, default=0.6)
+    parser.add_argument("--duration", type=float, default=0.5)
     parser.add_argument("--ranks", type=int, default=1)
     options = parser.parse_args()
     histories: dict[str, list[dict[str, list]]] = {engine: [] for engine in ENGINES}
