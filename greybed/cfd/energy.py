@@ -90,8 +90,8 @@ def advance(
     """Temperatures after a step, and the heat that particles have given per volume and time.
 
     ``old`` and ``new`` are masses per volume before and after, of which ``flux`` makes one from the
-    other. Heun's method in the conservative form, both stages bounded; heat from particles is
-    implicit.
+    other. Heun's method in the conservative form, bounded where no heat is given; heat from
+    particles is implicit.
     """
     c = forces.rates(sides)
     spill = np.zeros_like(t)
@@ -106,13 +106,14 @@ def advance(
     for part in range(count):
         after = new if part == count - 1 else mass + growth
         content = mass * t
-        first = content + h * _rate(sides, fluid, t, flux, conductivity, spill)
-        second = first + h * _rate(sides, fluid, first / after, flux, conductivity, spill)
-        content = 0.5 * (content + second)
-        inert = cp * after
-        t = (cp * content + h * (heating.coefficient * heating.target + heating.source)) / (
-            inert + h * heating.coefficient
-        )
-        heat += (inert * t - cp * content) / (h * count)
+        inert = cp * after + h * heating.coefficient
+        given = h * (heating.coefficient * heating.target + heating.source)
+        rate = _rate(sides, fluid, t, flux, conductivity, spill)
+        # The first stage knows of the heat too: a steady state is one of both stages.
+        between = (cp * (content + h * rate) + given) / inert
+        rate = 0.5 * (rate + _rate(sides, fluid, between, flux, conductivity, spill))
+        content = content + h * rate
+        t = (cp * content + given) / inert
+        heat += cp * (after * t - content) / (h * count)
         mass = after
     return t, heat

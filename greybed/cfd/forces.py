@@ -54,12 +54,23 @@ def slopes(sides: Sides, p: Array) -> Faces:
     return found[0], found[1], found[2]
 
 
-def transport(sides: Sides, velocity: Faces, flux: Faces, viscosity: Array) -> Faces:
-    """What convection and viscous stress do to the velocities [N/m3].
+def convection(sides: Sides, velocity: Faces, flux: Faces) -> Faces:
+    """What convection does to velocities [N/m3]: minus div(F u) + u div F.
 
-    Convection stands in the form div(F u) - u div F, which leaves a uniform velocity alone whatever
-    the void fraction does. ``viscosity`` is that of the phase in cells, padded.
+    A uniform velocity is left alone whatever the void fraction does.
     """
+    c, found = rates(sides), []
+    for own in range(3):
+        out = np.zeros(velocity[own].shape)
+        if sides.wide[own]:
+            padded = sides.faces(velocity[own], own, flux)
+            _flux.convect(padded, *sides.mass_fluxes(flux, own), *c, out)
+        found.append(out)
+    return found[0], found[1], found[2]
+
+
+def friction(sides: Sides, velocity: Faces, flux: Faces, viscosity: Array) -> Faces:
+    """Divergence of the viscous stress [N/m3]; ``viscosity`` is that of the phase, padded."""
     padded = [sides.faces(velocity[a], a, flux) for a in range(3)]
     c = rates(sides)
     nz, ny, nx = sides.grid.shape
@@ -72,7 +83,6 @@ def transport(sides: Sides, velocity: Faces, flux: Faces, viscosity: Array) -> F
     for own, stress in enumerate(((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))):
         out = np.zeros(velocity[own].shape)
         if sides.wide[own]:
-            _flux.convect(padded[own], *sides.mass_fluxes(flux, own), *c, out)
             _flux.divergence(*stress, *c, 1.0, out)
         found.append(out)
     return found[0], found[1], found[2]

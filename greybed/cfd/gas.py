@@ -188,13 +188,13 @@ class GasSolver:
             if not np.isfinite(out).all():
                 raise InputError("velocity: all values [m/s] must be finite.")
             found.append(out)
-        self.state = replace(self.state, velocity=(found[0], found[1], found[2]), rates=None)
+        self.state = replace(self.state, velocity=(found[0], found[1], found[2]), convection=None)
         self._projection.hold_rims(self.state.velocity, self.state.void_fraction)
 
     def time_step(self, courant: float = 0.4, most: float = math.inf) -> float:
-        """Longest step that crosses so many cells at most, and is not cut for viscosity [s]."""
+        """Longest step that crosses so many cells at most [s]."""
         rate = self._part.crossings(self.state.velocity)
-        return min(most, courant / max(rate, 1e-300), self._part.viscous_limit(self.state))
+        return min(most, courant / max(rate, 1e-300))
 
     def save(self) -> dict[str, Array]:
         """The state as arrays; :meth:`restore` goes on with the same bits."""
@@ -202,12 +202,13 @@ class GasSolver:
         out = {
             "pressure": s.pressure, "void_fraction": s.void_fraction, "mass": s.mass,
             "temperature": s.temperature, "gradient": s.gradient,
-            "times": np.array([s.time, s.before]),
+            "times": np.array([s.time, s.before]), "spilled": s.spilled,
         }  # fmt: skip
         for axis, name in enumerate("uvw"):
             out[name] = s.velocity[axis]
-            if s.rates is not None:
-                out[f"rate_{name}"] = s.rates[axis]
+            if s.convection is not None and s.friction is not None:
+                out[f"convection_{name}"] = s.convection[axis]
+                out[f"friction_{name}"] = s.friction[axis]
         return {name: a.copy() for name, a in out.items()}
 
     def restore(self, saved: Mapping[str, Array]) -> None:
@@ -217,10 +218,11 @@ class GasSolver:
             if name not in saved or saved[name].shape != shape:
                 raise InputError(f"saved gas: {name} of shape {shape} is missing.")
         u, v, w = (np.array(saved[n], dtype=np.float64) for n in "uvw")
-        rates = None
-        if "rate_u" in saved:
-            a, b, c = (np.array(saved[f"rate_{n}"], dtype=np.float64) for n in "uvw")
-            rates = (a, b, c)
+        kept: list[Faces | None] = [None, None]
+        if "convection_u" in saved:
+            for k, name in enumerate(("convection", "friction")):
+                a, b, c = (np.array(saved[f"{name}_{n}"], dtype=np.float64) for n in "uvw")
+                kept[k] = (a, b, c)
         cells = [
             np.array(saved[n], dtype=np.float64)
             for n in ("pressure", "void_fraction", "mass", "temperature")
@@ -228,7 +230,19 @@ class GasSolver:
         time, before = (float(t) for t in saved["times"])
         gradient = np.array(saved["gradient"], dtype=np.float64)
         p, eps, mass, t = cells
-        self.state = Gas((u, v, w), p, eps, mass, t, time, gradient, rates, before)
+        self.state = Gas(
+            (u, v, w),
+            p,
+            eps,
+            mass,
+            t,
+            time,
+            gradient,
+            kept[0],
+            kept[1],
+            before,
+            np.array(saved["spilled"]),
+        )
 
     # -- a step -----------------------------------------------------------------------------
 

@@ -29,8 +29,11 @@ class Gas:
         [s].
     gradient : array, shape (3,)
         Imposed pressure gradient, or the one that keeps an imposed flow [Pa m-1].
-    rates : three arrays or None
-        Convection and viscosity of the step before [N m-3], of length ``before`` [s].
+    convection, friction : three arrays or None
+        What convection and viscosity did in the step before [N m-3], whose length was ``before``
+        [s].
+    spilled : array, shape (3,)
+        Momentum per time that convection then left to the lag of the budget [N].
     """
 
     velocity: Faces
@@ -40,8 +43,10 @@ class Gas:
     temperature: Array
     time: float
     gradient: Array
-    rates: Faces | None = None
+    convection: Faces | None = None
+    friction: Faces | None = None
     before: float = 0.0
+    spilled: Array = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True, eq=False)

@@ -119,6 +119,7 @@ class GasParticles:
         self.transfer = Transfer(grid, self.smoother)
         self.time = 0.0
         self.steps = 0
+        self._passed = 0.0  # length of the last step [s]
         self.gas_report: Any = None  # of the last step
         self._rate: float | None = None
         self._seen: Array | None = None  # gas velocity at the particles, by label
@@ -178,7 +179,8 @@ class GasParticles:
         before = self.void
         overlaps = self._overlaps = self._look()
         self.void, least, limited = self._void_of(overlaps)
-        rate = (self.void - before) / dt
+        # What has moved since the last look took the time of the step before.
+        rate = (self.void - before) / (self._passed or dt)
         mass = sim._state.motion[:, 6]
         seen = self._read(gas.velocity)
         terms = self._terms(overlaps, seen)
@@ -245,6 +247,7 @@ class GasParticles:
             self.heat.close()
         self.time += dt
         self.steps += 1
+        self._passed = dt
         scale = float(max(parts.max(initial=0.0), 1e-300))
         return ExchangeReport(
             self.time, dt, count, given, taken, rims, dt * by_pressure.sum(axis=0),
@@ -353,7 +356,9 @@ class GasParticles:
         seen = np.zeros((0, 3)) if self._seen is None else self._seen
         rate = -1.0 if self._rate is None else self._rate
         return {"coupling_void": self.void, "coupling_seen": seen,
-                "coupling_clock": np.array([self.time, float(self.steps), rate])}  # fmt: skip
+                "coupling_clock": np.array(
+                    [self.time, float(self.steps), rate, self._passed]
+                )}  # fmt: skip
 
     def go_back(self, state: Mapping[str, Any]) -> None:
         """Take up what :meth:`state` has given, after gas and particles have been restored.
@@ -366,7 +371,9 @@ class GasParticles:
         try:
             self.void = np.array(state["coupling_void"])
             seen = np.array(state["coupling_seen"])
-            self.time, steps, rate = (float(value) for value in state["coupling_clock"])
+            self.time, steps, rate, self._passed = (
+                float(value) for value in state["coupling_clock"]
+            )
         except KeyError:
             raise InputError("this checkpoint holds no gas; give the case that wrote it.") from None
         self._seen = seen if len(seen) else None

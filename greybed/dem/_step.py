@@ -94,7 +94,9 @@ def _kick_and_drift(begin, end, state, near, push, dt, finish, start, worst):
                     load[8 * i + c] += crossing[slots[k], c]
         vx, vy, vz = motion[m], motion[m + np.uint64(1)], motion[m + np.uint64(2)]
         if body[i] < 0 and not fixed[i]:
-            kick, spin = half / motion[m + np.uint64(6)], half / motion[m + np.uint64(7)]
+            mass, inertia = motion[m + np.uint64(6)], motion[m + np.uint64(7)]
+            share = half / (mass * inertia)  # one division for both
+            kick, spin = share * inertia, share * mass
             ax = kick * load[m] + gx
             ay = kick * load[m + np.uint64(1)] + gy
             az = kick * load[m + np.uint64(2)] + gz
