@@ -37,13 +37,13 @@ AIR = Fluid(density=1.2, viscosity=1.8e-5)
 
 def settling(_: Path) -> dict[str, Any]:
     """Net speed at several places in a cell, against the exact one."""
-    d, density, rise, edge = 100e-6, 2000.0, 0.40, 0.004
+    d, density, rise, edge, g = 100e-6, 2000.0, 0.40, 0.004, 9.80665
     low, high = 0.0, 2.0
     for _step in range(100):
         s = 0.5 * (low + high)
         re = AIR.density * d * s / AIR.viscosity
         drag = 3.0 * math.pi * AIR.viscosity * d * s * (1.0 + 0.15 * re**0.687)
-        heavy = drag < math.pi / 6 * d**3 * (density - AIR.density) * 9.81
+        heavy = drag < math.pi / 6 * d**3 * (density - AIR.density) * g
         low, high = (s, high) if heavy else (low, s)
     exact, found = rise - low, []
     for where in (0.0, 0.25, 0.5, 0.75):
@@ -51,7 +51,7 @@ def settling(_: Path) -> dict[str, Any]:
         sim = Simulation(
             [[edge * where] * 2 + [edge * (10 + where)]], 0.5 * d,
             Material(density, 5e3, 0.3, "sand"), Contact(0.9, 0.0), time_step=4e-5,
-            box=[[0, 0, 0], size], periodic=(True, True, False), threads=1,
+            box=[[0, 0, 0], size], periodic=(True, True, False), threads=1, gravity=(0.0, 0.0, -g),
         )  # fmt: skip
         grid = Grid(cells=(1, 1, 12), upper=size, periodic=(True, True, False))
         gas = GasSolver(grid, {"z-": Inflow(rise), "z+": Outlet()}, AIR)
