@@ -27,7 +27,7 @@ class BedRadiation:
 
     Parameters
     ----------
-    rows : Rows, or callable
+    rows : Rows, traced result or callable
         View or exchange factors in the order of ``simulation.centres``: traced ones of a bed at
         rest, or a callable of the simulation that gives those of its present places, such as one
         that asks a closure.
@@ -48,7 +48,7 @@ class BedRadiation:
 
     def __init__(
         self,
-        rows: Rows | Callable[[Simulation], Rows],
+        rows: Any | Callable[[Simulation], Any],
         emissivity: ArrayLike = 1.0,
         *,
         wall_temperatures: Sequence[float | None] = (),
@@ -65,7 +65,7 @@ class BedRadiation:
     def _renew(self, simulation: Simulation) -> Exchange:
         stale = callable(self._rows) and self._asked % self._every == 0
         if self._exchange is None or stale:
-            rows = self._rows(simulation) if callable(self._rows) else self._rows
+            rows = Rows.taken(self._rows(simulation) if callable(self._rows) else self._rows)
             count = rows.wall_factors.shape[1]
             bounds = boundary_temperatures(self._walls, self._environment, count)
             self._exchange = Exchange(rows, self._emissivity, bounds)
