@@ -85,8 +85,12 @@ class Grid:
 
     def centres(self, axis: int) -> Array:
         """Coordinates of the cell centres along an axis [m]."""
-        return self.lower[axis] + self.spacing[axis] * np.arange(0.5, self.cells[axis], dtype=np.float64)
+        return self.lower[axis] + self.spacing[axis] * np.arange(
+            0.5, self.cells[axis], dtype=np.float64
+        )
 
     def faces(self, axis: int) -> Array:
         """Coordinates of the faces across an axis [m]."""
-        return self.lower[axis] + self.spacing[axis] * np.arange(self.cells[axis] + 1, dtype=np.float64)
+        return self.lower[axis] + self.spacing[axis] * np.arange(
+            self.cells[axis] + 1, dtype=np.float64
+        )
