@@ -82,7 +82,8 @@ def drum(axes: Any, folder: Path, reference: dict[str, Any]) -> None:
     for name, mark, colour in (("LIGGGHTS", "o", THEIRS), ("MUSEN", "x", OTHERS)):
         axes.plot(known["time"], np.array(known[name]) / 1e3, mark, color=colour, label=name)
     axes.set(xlabel="time of turning [s]", ylabel="M1 in zone 2 [thousand of 30]", title="Drum")
-    axes.legend(fontsize=8)
+    axes.set_ylim(top=33.0)
+    axes.legend(fontsize=8, loc="upper right")
 
 
 def impact(axes: Any, folder: Path, reference: dict[str, Any]) -> None:
