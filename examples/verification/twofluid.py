@@ -85,6 +85,8 @@ def growth(axis: Any) -> float:
             axis.plot(1e3 * length, found, "o", color=colour, mfc="none")
             worst = max(worst, abs(found - rate.real))
     axis.axhline(0.0, color="0.7", lw=0.8)
+    axis.set_xticks((2, 5, 10, 20), labels=("2", "5", "10", "20"), minor=False)
+    axis.xaxis.set_minor_formatter("")
     axis.set(xlabel="wavelength [mm]", ylabel="growth rate [1/s]", title="Small waves, φ = 0.2")
     axis.legend()
     return worst
@@ -101,6 +103,8 @@ def order(axis: Any) -> float:
     axis.loglog(cells, errors, "o-", mfc="none", label="greybed")
     axis.loglog(cells, errors[0] * (cells[0] / cells) ** 2.0, "k--", lw=0.8, label="second order")
     axis.set(xlabel="cells per wave", ylabel="mean error over amplitude", title="Order in space")
+    axis.set_xticks(cells, labels=[str(n) for n in cells])
+    axis.xaxis.set_minor_formatter("")
     axis.legend()
     return float(np.log2(errors[-2] / errors[-1]))
 
