@@ -56,15 +56,34 @@ class Poisson:
             raise InputError(
                 f"transmissibilities of shapes {tx.shape}, {ty.shape}, {tz.shape} must be {shapes}."
             )
+        self.shape = (nz, ny, nx)
+        # The compiled loops are fast where the axis of one cell is z: turn such planes.
+        self._turn = -1
+        if ny == 1 and nz > 1 and not periodic[1] and not ty.any():
+            self._turn, periodic = 1, (periodic[0], periodic[2], False)
+        elif nx == 1 and nz > 1 and not periodic[0] and not tx.any():
+            self._turn, periodic = 0, (periodic[1], periodic[2], False)
         self.periodic = periodic
         self.levels: list[_Level] = []
         self.update(tx, ty, tz)
+
+    def _turned(self, tx: Array, ty: Array, tz: Array) -> tuple[Array, Array, Array]:
+        nz, ny, nx = self.shape
+        if self._turn == 1:
+            return tx.reshape(1, nz, nx + 1), tz.reshape(1, nz + 1, nx), np.zeros((2, nz, nx))
+        if self._turn == 0:
+            return ty.reshape(1, nz, ny + 1), tz.reshape(1, nz + 1, ny), np.zeros((2, nz, ny))
+        return tx, ty, tz
 
     def update(self, tx: Array, ty: Array, tz: Array) -> None:
         """Take other transmissibilities of the same shapes."""
         for name, t in (("tx", tx), ("ty", ty), ("tz", tz)):
             if not (np.isfinite(t).all() and (t >= 0.0).all()):
                 raise InputError(f"{name}: transmissibilities must be finite and at least 0.")
+        closed = {0: tx, 1: ty}.get(self._turn)
+        if closed is not None and closed.any():
+            raise InputError("transmissibilities: an axis of one cell was closed before; keep it.")
+        tx, ty, tz = self._turned(tx, ty, tz)
         if not self.levels:
             self._lay_levels(tx, ty, tz)
         top = self.levels[0]
@@ -149,7 +168,12 @@ class Poisson:
             _multigrid.sweep(level.p, level.b, *faces, colour)
 
     def solve(
-        self, outflow: Array, start: Array | None = None, *, tolerance: float = 1e-8
+        self,
+        outflow: Array,
+        start: Array | None = None,
+        *,
+        tolerance: float = 1e-8,
+        enough: float = 0.0,
     ) -> tuple[Array, int]:
         """Values of the cells.
 
@@ -161,6 +185,8 @@ class Poisson:
             First guess; 0 by default.
         tolerance : float
             Largest norm of the residual over that of ``outflow`` [-].
+        enough : float
+            A norm of the residual that is small enough anyhow.
 
         Returns
         -------
@@ -174,6 +200,8 @@ class Poisson:
             If the residual does not come down.
         """
         top = self.levels[0]
+        outflow = outflow.reshape(top.b.shape)
+        start = None if start is None else start.reshape(top.b.shape)
         b = outflow - outflow.mean() if self.singular else outflow
         size = float(np.sqrt((b**2).sum()))
         p = np.zeros_like(b) if start is None else start.copy()
@@ -182,8 +210,8 @@ class Poisson:
         r = b - work
         direction, old = np.zeros_like(b), 1.0
         for iteration in range(_MOST_ITERATIONS + 1):
-            if float(np.sqrt((r**2).sum())) <= tolerance * size:
-                return (p - p.mean() if self.singular else p), iteration
+            if float(np.sqrt((r**2).sum())) <= max(tolerance * size, enough):
+                return (p - p.mean() if self.singular else p).reshape(self.shape), iteration
             top.b[...] = r
             self._cycle(0)
             z = top.p

@@ -1,13 +1,18 @@
-"""Run a case from a TOML file: temperatures of a bed between walls, or particles that move.
+"""Run a case from a TOML file: a bed between walls, particles that move, gas, or both together.
 
 kind = "thermal-bed" writes temperatures.csv, bed.vtu (for ParaView) and summary.json; a transient
 case also history.csv. kind = "particles" writes history.csv, final.h5, final.vtu, final.png,
 frames.pvd with its frames (or frames.vtkhdf), and summary.json; stopped by Ctrl-C or a kill, it
 goes on from its checkpoint when the same command is given again, and ends with the same bits.
+kind = "gas-particles" is particles in a gas, "gas" a gas alone, "two-fluid" gas and particles as
+two fluids; they write frames of the grid as frames.vtkhdf (gas_frames.vtkhdf beside particles).
+--engine liggghts hands the same case to LIGGGHTS and reads its results back (docs/liggghts.md).
 
 examples:
   greybed simulate examples/heated_bed/case.toml --out runs/heated_bed
   greybed simulate examples/particles/hopper.toml --out runs/hopper --movie
+  greybed simulate examples/flows/clusters.toml --out runs/clusters --movie
+  greybed simulate examples/particles/hopper.toml --out runs/hopper2 --engine liggghts --ranks 2
 """
 
 from __future__ import annotations
@@ -17,6 +22,8 @@ from pathlib import Path
 
 import numpy as np
 
+from greybed.cli.simulate_flow import run_flow
+from greybed.cli.simulate_liggghts import run_liggghts
 from greybed.cli.simulate_particles import run_particles
 from greybed.core.config import read_toml
 from greybed.core.errors import InputError
@@ -32,7 +39,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("case", type=Path, help="case file (TOML)")
     parser.add_argument("--out", type=Path, required=True, help="folder for the results")
     parser.add_argument("--threads", type=int, help="threads (default: all); changes no bit")
-    parser.add_argument("--movie", action="store_true", help="particles: movie.gif of the frames")
+    parser.add_argument("--movie", action="store_true", help="movie.gif of the frames")
+    parser.add_argument(
+        "--engine", choices=("greybed", "liggghts"), default="greybed",
+        help="particles: who moves them (default: greybed); liggghts runs through MPI",
+    )  # fmt: skip
+    parser.add_argument("--ranks", type=int, help="liggghts: MPI ranks (default: 1)")
     parser.add_argument("--quiet", action="store_true", help="no progress bars")
 
 
@@ -48,10 +60,19 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(
             f"--threads = {options.threads} [-] must be at least 1; leave it out for all."
         )
-    if read_toml(options.case).get("kind") == "particles":
-        return run_particles(options)
+    if options.ranks is not None and options.engine != "liggghts":
+        raise InputError("--ranks is for --engine liggghts only; take --threads, or leave it out.")
+    kind = read_toml(options.case).get("kind")
+    if kind == "particles" and options.engine == "liggghts":
+        return run_liggghts(options)
+    if options.engine != "greybed":
+        raise InputError(f"--engine {options.engine} is for particles only; leave it out.")
+    if kind in ("particles", "gas-particles"):
+        return run_particles(options, gas=kind == "gas-particles")
+    if kind in ("two-fluid", "gas"):
+        return run_flow(options, str(kind))
     if options.movie:
-        raise InputError("--movie is for particles only; leave it out.")
+        raise InputError("--movie is for particles and flows only; leave it out.")
     case = load_case(options.case)
     folder = output_folder(options.out)
     packing = read_packing(case.packing.file, walls=case.walls)

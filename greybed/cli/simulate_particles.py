@@ -9,35 +9,45 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from greybed.core.packing import Packing
-    from greybed.dem.runner import ParticleRun
+    from greybed.dem.case import ParticleCase
+    from greybed.dem.samples import Run
 
 CHECKPOINT = "checkpoint.npz"
 
 
-def run_particles(options: argparse.Namespace) -> int:
-    """Run the case that ``options`` names, from its checkpoint if there is one; returns 0."""
+def run_particles(options: argparse.Namespace, *, gas: bool = False) -> int:
+    """Run the case that ``options`` names, from its checkpoint if there is one; returns 0.
+
+    With ``gas`` it is one of particles in a gas.
+    """
     from greybed.core.errors import InputError
-    from greybed.core.files import output_folder, sha256_of, sole_writer, write_summary
+    from greybed.core.files import output_folder, sha256_of, sole_writer
     from greybed.core.progress import progress
     from greybed.core.readers import read_packing
-    from greybed.core.writers import write_packing
     from greybed.dem.case import load_particle_case
-    from greybed.dem.case_tables import FileTable
     from greybed.dem.checkpoint import kept_with
     from greybed.dem.results import results_of
     from greybed.dem.runner import ParticleRun
 
-    case = load_particle_case(options.case)
-    files = {k: t.file for k, t in enumerate(case.particles) if isinstance(t, FileTable)}
-    inputs = [options.case, *files.values()]
-    inputs += [part.file for part in (*case.wall, *case.shape) if hasattr(part, "file")]
+    case: Any
+    kind: Any
+    if gas:
+        from greybed.cli.gas_frames import GasFrames
+        from greybed.coupling.gas_particles_case import load_gas_particles_case
+        from greybed.coupling.gas_particles_run import GasParticlesRun
+
+        case, kind = load_gas_particles_case(options.case), GasParticlesRun
+        shown: type[Frames] = GasFrames
+    else:
+        case, kind, shown = load_particle_case(options.case), ParticleRun, Frames
+    files, inputs = files_of(case, options.case)
     key = "".join(sha256_of(path) for path in inputs)
     folder = output_folder(options.out)
     checkpoint = folder / CHECKPOINT
     with sole_writer(folder / ".simulate.lock"):
         packings = {k: read_packing(path) for k, path in files.items()}
         try:
-            run = ParticleRun(case, packings, threads=options.threads)
+            run = kind(case, packings, threads=options.threads)
         except InputError as error:
             raise InputError(f"{options.case}: {error}") from None
         found = 0
@@ -45,10 +55,11 @@ def run_particles(options: argparse.Namespace) -> int:
         if kept is not None and kept.get("key") == key:
             run.restore(checkpoint)
             found = run.simulation.steps
-        frames = _Frames(run, folder, options.movie)
+        frames = shown(run, folder, options.movie)
         every = case.output.checkpoints or 0.1 * case.duration
         apart = max(1, round(every / run.simulation.time_step))
         begin, moved = time.perf_counter(), 0
+        gas_steps = run.totals["gas steps"] if gas else 0
         with progress(run.steps, "time steps", show=not options.quiet) as advance:
             advance(found)
             if not found:
@@ -64,7 +75,7 @@ def run_particles(options: argparse.Namespace) -> int:
                         frames.write()
                     if step // apart > (step - done) // apart or step == run.steps:
                         run.save(checkpoint, key=key)
-                        _write_history(folder / "history.csv", run)
+                        write_history(folder / "history.csv", run)
                     advance(done)
             except KeyboardInterrupt:
                 if not run.simulation._pending:
@@ -76,29 +87,54 @@ def run_particles(options: argparse.Namespace) -> int:
                     f"{options.case}: {said}; the last good state is in {checkpoint}."
                 ) from None
         seconds = time.perf_counter() - begin
-        _write_history(folder / "history.csv", run)
-        final = frames.packing()
-        write_packing(final, folder / "final.h5")
-        write_packing(final, folder / "final.vtu", fields=frames.fields())
         results: dict[str, Any] = {
             **results_of(run),
+            **(run.gas_results() if gas else {}),
             "steps_found_from_stopped_run": found,
             "seconds": seconds,
             "particle_steps_per_second": moved / seconds if moved else None,
             "threads": run.simulation.threads,
         }
-        frames.finish()
-        _draw(folder, run, frames)
-        summary = write_summary(folder, "simulate", results, *inputs, seed=case.seed)
-    _say(results, found, folder)
+        if gas:
+            rate = results["gas"]["cells"] * (run.totals["gas steps"] - gas_steps) / seconds
+            results["cell_steps_per_second"] = rate or None
+        summary = write_results(folder, run, frames, results, inputs)
+    if found:
+        print(f"went on from a stopped run at step {found}")
+    say(results, folder)
     print(f"wrote {summary}")
     return 0
 
 
-class _Frames:
+def files_of(case: ParticleCase, path: Path) -> tuple[dict[int, Path], list[Path]]:
+    """Files of particles by the numbers of their tables, and all files that a case reads."""
+    from greybed.dem.case_tables import FileTable
+
+    files = {k: t.file for k, t in enumerate(case.particles) if isinstance(t, FileTable)}
+    parts = [part.file for part in (*case.wall, *case.shape) if hasattr(part, "file")]
+    return files, [path, *files.values(), *parts]
+
+
+def write_results(
+    folder: Path, run: Run, frames: Frames, results: dict[str, Any], inputs: list[Path]
+) -> Path:
+    """Write history, end, collection of frames, pictures, film and summary of any engine."""
+    from greybed.core.files import write_summary
+    from greybed.core.writers import write_packing
+
+    write_history(folder / "history.csv", run)
+    final = frames.packing()
+    write_packing(final, folder / "final.h5")
+    write_packing(final, folder / "final.vtu", fields=frames.fields())
+    frames.finish()
+    _draw(folder, run, frames)
+    return write_summary(folder, "simulate", results, *inputs, seed=run.case.seed)
+
+
+class Frames:
     """Frames of a run as VTU files with a ParaView collection, and as pictures for a film."""
 
-    def __init__(self, run: ParticleRun, folder: Path, movie: bool) -> None:
+    def __init__(self, run: Run, folder: Path, movie: bool) -> None:
         self.run, self.folder, self.movie = run, folder / "frames", movie
         every = run.case.output.frames
         self.every = None if every is None else max(1, round(every / run.simulation.time_step))
@@ -207,6 +243,7 @@ class _Frames:
         return sim.labels
 
     def limits(self) -> tuple[float, float]:
+        """What the colours of pictures range over."""
         values = self.values()
         if (case := self.run.case).heat is not None:
             tables = (*case.wall, *case.particles, case.heat)
@@ -232,7 +269,8 @@ class _Frames:
         return self.stage
 
 
-def _write_history(path: Path, run: ParticleRun) -> None:
+def write_history(path: Path, run: Run) -> None:
+    """Write the samples as CSV."""
     from greybed.core.files import atomic_path
 
     rows = run.tally.history
@@ -242,23 +280,23 @@ def _write_history(path: Path, run: ParticleRun) -> None:
             stream.write(",".join(f"{value:.9g}" for value in row.values()) + "\n")
 
 
-def _draw(folder: Path, run: ParticleRun, frames: _Frames) -> None:
+def _draw(folder: Path, run: Run, frames: Frames) -> None:
     """A picture of the end, and plots of the history."""
     import numpy as np
 
-    from greybed.report.particles import frame_picture, write_frame, write_history
+    from greybed.report.particles import frame_picture, write_frame
+    from greybed.report.particles import write_history as plot_history
 
     packing = frames.packing()
     x, r = packing.centres, packing.radii[:, None]
     stage = np.array([(x - r).min(axis=0), (x + r).max(axis=0)])
     picture = frame_picture(packing, frames.values(), stage, frames.limits())
     write_frame(folder / "final.png", picture)
-    write_history(folder / "history.png", run.tally.history)
+    plot_history(folder / "history.png", run.tally.history)
 
 
-def _say(results: dict[str, Any], found: int, folder: Path) -> None:
-    if found:
-        print(f"went on from a stopped run at step {found}")
+def say(results: dict[str, Any], folder: Path) -> None:
+    """Print what a run has come to."""
     rate = results["particle_steps_per_second"]
     print(
         f"{results['particles']} particles after {results['simulated_s']:.4g} s "

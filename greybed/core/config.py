@@ -71,6 +71,11 @@ def words(default: Any = MISSING) -> Any:
     return dataclasses.field(default=default, metadata={"words": True})
 
 
+def counts(default: Any = MISSING) -> Any:
+    """Field of a case: three whole numbers from 1, one for each axis [-]."""
+    return dataclasses.field(default=default, metadata={"counts": True})
+
+
 @dataclasses.dataclass(frozen=True)
 class _Place:
     """Where a value stands: file and dotted key."""
@@ -122,7 +127,8 @@ def read_case(path: str | os.PathLike[str], kind: type[T]) -> T:
         The file.
     kind : dataclass
         Fields made by :func:`quantity`, :func:`vector`, :func:`whole`, :func:`choice`,
-        :func:`tables`, :func:`rows`, :func:`words`, or plain ones of type str, bool, int, Path
+        :func:`tables`, :func:`rows`, :func:`words`, :func:`counts`, or plain ones of type str,
+        bool, int, Path
         (relative to the file), or a dataclass.
 
     Returns
@@ -184,6 +190,8 @@ def _wanted(hint: Any, field: dataclasses.Field[Any]) -> str:
         return "a list of tables"
     if "words" in field.metadata:
         return "a list of strings"
+    if "counts" in field.metadata:
+        return "three whole numbers"
     if "variants" in field.metadata:
         return f"[[{field.name}]] tables"
     if dataclasses.is_dataclass(hint):
@@ -204,6 +212,8 @@ def _value(value: Any, hint: Any, rules: Mapping[str, Any], place: _Place) -> An
         return tuple(
             _typed(v, str, "a string in quotes", place.at(str(i))) for i, v in enumerate(items)
         )
+    if "counts" in rules:
+        return _counts(value, place)
     if "options" in rules:
         return _choice(value, rules["options"], place)
     if "size" in rules:
@@ -277,6 +287,14 @@ def _vector(value: Any, dimension: str, place: _Place) -> tuple[float, float, fl
     if not isinstance(value, list) or len(value) != 3:
         raise InputError(f"{place} = {value!r} must be three numbers, like [0.0, 0.0, 1.0].")
     x, y, z = (_number(v, dimension, place) for v in value)
+    return x, y, z
+
+
+def _counts(value: Any, place: _Place) -> tuple[int, int, int]:
+    whole = isinstance(value, list) and all(type(n) is int and n >= 1 for n in value)
+    if not whole or len(value) != 3:
+        raise InputError(f"{place} = {value!r} must be three whole numbers from 1, like [8, 8, 1].")
+    x, y, z = value
     return x, y, z
 
 

@@ -18,8 +18,8 @@ from greybed.core.packing import RADII
 Array = NDArray[np.float64]
 
 FORMS = (
-    "mono:1.5mm, lognormal:1.5mm,1.3, uniform:1mm,2mm, rosin-rammler:1.5mm,3 or "
-    "discrete:1mm=0.3,2mm=0.7"
+    "mono:1.5mm, lognormal:1.5mm,1.3, uniform:1mm,2mm, rosin-rammler:1.5mm,3, "
+    "discrete:1mm=0.3,2mm=0.7 or quantiles:D10=2mm,D50=3mm,D90=4mm"
 )
 
 
@@ -181,6 +181,53 @@ class RosinRammler(Sizes):
 
 
 @dataclass(frozen=True)
+class MassQuantiles(Sizes):
+    """Diameters that 10, 50 and 90 % of the mass lie below, as a sieve or a laser tells them.
+
+    Log-normal by mass in two halves: ln d is linear in the normal deviate of the mass share from
+    D10 to D50 and beyond, and from D50 to D90 and beyond, so that all three come back; with
+    D50^2 = D10 D90 it is one log-normal law (Hatch & Choate, J. Franklin Inst. 207 (1929) 369). The
+    outermost percent of the mass on either side has the size of its edge.
+    """
+
+    d10: float  # [m]
+    d50: float  # [m]
+    d90: float  # [m]
+
+    def __post_init__(self) -> None:
+        for name in ("d10", "d50", "d90"):
+            _check_positive(0.5 * getattr(self, name), f"half of {name.upper()}", "m")
+        if not self.d10 <= self.d50 <= self.d90:
+            raise InputError(
+                f"D10 = {self.d10:g}, D50 = {self.d50:g} and D90 = {self.d90:g} [m] must rise; "
+                "exchange them."
+            )
+        if self.d90 > 20.0 * self.d10:
+            raise InputError(
+                f"D90 = {self.d90:g} [m] is more than 20 times D10 = {self.d10:g} [m]; cut the "
+                "fines off, they cannot be simulated beside the rest."
+            )
+
+    def quantiles(self, p: Array) -> Array:
+        """Radius at each share ``p`` of the number, shape (n,) [m]."""
+        mass = (np.arange(4096) + 0.5) / 4096
+        normal = NormalDist()
+        known = [normal.inv_cdf(q) for q in (0.01, 0.1, 0.5, 0.9, 0.99)]
+        low, middle, high = (math.log(0.5 * d) for d in (self.d10, self.d50, self.d90))
+        ends = [
+            middle + (low - middle) * known[0] / known[1],
+            middle + (high - middle) * known[4] / known[3],
+        ]
+        deviates = np.array([normal.inv_cdf(float(q)) for q in mass])
+        radii = np.exp(np.interp(deviates, known, [ends[0], low, middle, high, ends[1]]))
+        number = np.cumsum(radii**-3.0)
+        return np.interp(p, (number - 0.5 * radii**-3.0) / number[-1], radii)
+
+    def __str__(self) -> str:
+        return f"spheres of D10 {self.d10:g}, D50 {self.d50:g} and D90 {self.d90:g} m by mass"
+
+
+@dataclass(frozen=True)
 class Discrete(Sizes):
     """A few radii, each with its share of the mass (equal densities) or of the number."""
 
@@ -279,9 +326,17 @@ def _discrete(words: list[str], length: Callable[[str], float]) -> Sizes:
     return Discrete(sizes, tuple(_number(share, "mass fraction") for _, share in pairs))
 
 
+def _quantiles(words: list[str], length: Callable[[str], float]) -> Sizes:
+    pairs = dict(word.split("=") for word in words)
+    known = {name.strip().lower(): length(size) for name, size in pairs.items()}
+    if len(words) != 3 or set(known) != {"d10", "d50", "d90"}:
+        raise ValueError
+    return MassQuantiles(**known)
+
+
 _PARSERS = {
     "mono": _mono, "lognormal": _lognormal, "uniform": _uniform, "discrete": _discrete,
-    "rosin-rammler": _rosin_rammler,
+    "rosin-rammler": _rosin_rammler, "quantiles": _quantiles,
 }  # fmt: skip
 
 
@@ -292,8 +347,8 @@ def parse_sizes(text: str) -> Sizes:
     ----------
     text : str
         ``mono:RADIUS``, ``lognormal:MEDIAN,GEOMETRIC_SD``, ``uniform:SMALLEST,LARGEST``,
-        ``rosin-rammler:RADIUS,SPREAD`` or ``discrete:RADIUS=MASS_FRACTION,...``; every radius
-        with its unit.
+        ``rosin-rammler:RADIUS,SPREAD``, ``discrete:RADIUS=MASS_FRACTION,...`` or
+        ``quantiles:D10=DIAMETER,D50=DIAMETER,D90=DIAMETER`` (by mass); every length with its unit.
 
     Raises
     ------

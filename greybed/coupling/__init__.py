@@ -2,6 +2,9 @@
 
 from greybed.core.diffuse import DiffuseExchange, diffuse_exchange
 from greybed.coupling.conduction import Conductances, contact_conductances
+from greybed.coupling.drag_exchange import Settings as GasParticleSettings
+from greybed.coupling.gas_heat import BedRadiation, GasHeat, HeatReport
+from greybed.coupling.gas_particles import ExchangeReport, GasParticles
 from greybed.coupling.radiation import NetRadiation, net_radiation
 from greybed.coupling.radiative_network import (
     RadiativeResult,
@@ -11,14 +14,22 @@ from greybed.coupling.radiative_network import (
 from greybed.coupling.results import SolverError, Status, ThermalResult
 from greybed.coupling.rows import Rows, balanced
 from greybed.coupling.thermal import Material, ThermalBed
+from greybed.coupling.void_fraction import Smoother, solid_fraction
 
 __all__ = [
+    "BedRadiation",
     "Conductances",
     "DiffuseExchange",
+    "ExchangeReport",
+    "GasHeat",
+    "GasParticleSettings",
+    "GasParticles",
+    "HeatReport",
     "Material",
     "NetRadiation",
     "RadiativeResult",
     "Rows",
+    "Smoother",
     "SolverError",
     "Status",
     "ThermalBed",
@@ -29,4 +40,5 @@ __all__ = [
     "net_radiation",
     "pairwise_network",
     "radiative_network",
+    "solid_fraction",
 ]

@@ -86,9 +86,12 @@ def pair_geometry(work, n):
     for c in range(n):
         arm_i[c] = ri[c] - 0.5 * overlap[c]
         arm_j[c] = rj[c] - 0.5 * overlap[c]
-        r_eff[c] = ri[c] * rj[c] / (ri[c] + rj[c])
     for c in range(n):
-        m_eff[c] = mi[c] * mj[c] / (mi[c] + mj[c])
+        # One division for both: it is what this loop takes longest for.
+        r_sum, m_sum = ri[c] + rj[c], mi[c] + mj[c]
+        inverse = 1.0 / (r_sum * m_sum)
+        r_eff[c] = ri[c] * rj[c] * (m_sum * inverse)
+        m_eff[c] = mi[c] * mj[c] * (r_sum * inverse)
 
 
 @njit(**_OPTIONS)

@@ -124,10 +124,12 @@ def _settle(
         crossing.reshape(-1), rolling != col.NO_ROLLING,
     )  # fmt: skip
     count[0] += n
+    overlap, ri, rj, deepest = work[col.OVERLAP], work[col.RI], work[col.RJ], count[1]
     for c in range(n):
-        deep = work[col.OVERLAP, c] / min(work[col.RI, c], work[col.RJ, c])
-        if deep > count[1]:
-            count[1], count[2] = deep, who[2 * col.SIZE + c]
+        least = min(ri[c], rj[c])
+        if overlap[c] > deepest * least:
+            deepest = overlap[c] / least
+            count[1], count[2] = deepest, who[2 * col.SIZE + c]
 
 
 @njit(**_OPTIONS)

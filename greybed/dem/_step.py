@@ -25,6 +25,8 @@ class State(NamedTuple):
     listed: np.ndarray  # (n, 3): centre when the lists were made [m]
     fixed: np.ndarray  # (n,) bool: moves on as it does, whatever the force
     body: np.ndarray  # (n,) int64: rigid body that it belongs to, or -1
+    # (n, 6): force [N], torque [N m] from without; no rows where there is none
+    outer: np.ndarray = np.zeros((0, 6))
 
 
 class Near(NamedTuple):
@@ -79,6 +81,7 @@ def _kick_and_drift(begin, end, state, near, push, dt, finish, start, worst):
     load, listed, fixed = state.load.reshape(-1), state.listed.reshape(-1), state.fixed
     body = state.body
     into, slots, crossing = near.into, near.slots, near.crossing
+    outer, pushed = state.outer.reshape(-1), state.outer.shape[0] > 0
     halves = finish + start
     half = 0.5 * dt
     gx, gy, gz = half * push[0], half * push[1], half * push[2]
@@ -91,7 +94,9 @@ def _kick_and_drift(begin, end, state, near, push, dt, finish, start, worst):
                     load[8 * i + c] += crossing[slots[k], c]
         vx, vy, vz = motion[m], motion[m + np.uint64(1)], motion[m + np.uint64(2)]
         if body[i] < 0 and not fixed[i]:
-            kick, spin = half / motion[m + np.uint64(6)], half / motion[m + np.uint64(7)]
+            mass, inertia = motion[m + np.uint64(6)], motion[m + np.uint64(7)]
+            share = half / (mass * inertia)  # one division for both
+            kick, spin = share * inertia, share * mass
             ax = kick * load[m] + gx
             ay = kick * load[m + np.uint64(1)] + gy
             az = kick * load[m + np.uint64(2)] + gz
@@ -121,7 +126,7 @@ def _kick_and_drift(begin, end, state, near, push, dt, finish, start, worst):
             dz = z - listed[3 * i + 2]
             square = dx * dx + dy * dy + dz * dz
             for c in range(6):
-                load[m + np.uint64(c)] = 0.0
+                load[m + np.uint64(c)] = outer[6 * i + c] if pushed else 0.0
             if not square <= largest:  # also where it is not a number
                 largest, who = square, i
                 if square != square:

@@ -219,6 +219,8 @@ def wall_forces(
     """
     work, who = room(table)
     one = table.shape[0] == 1
+    # Flat: a slice of a row counts references, which takes longer than a plane's distance.
+    flat, moves = data.reshape(-1), wall_motion.reshape(-1)
     filled = np.int64(0)
     seen = np.empty((MOST_AT_ONCE, 7))
     met = np.empty(MOST_AT_ONCE, np.int64)
@@ -227,13 +229,22 @@ def wall_forces(
             continue
         x, y, z, r = place[i, 0], place[i, 1], place[i, 2], place[i, 3]
         mass = motion[i, 6]
-        number = 0
+        number, turns = 0, 1
         for turn in range(2):
+            if turn == turns:
+                break
             for k in range(first[i], first[i + 1]):
                 s = surface[k]
-                if turn == 1 and kinds[s] == PLANE:
-                    continue
-                distance, nx, ny, nz, where = nearest(kinds[s], data[s], x, y, z)
+                if kinds[s] == PLANE:
+                    if turn == 1:
+                        continue
+                    b = 13 * s
+                    nx, ny, nz, where = flat[b + 3], flat[b + 4], flat[b + 5], FACE
+                    distance = (x - flat[b]) * nx + (y - flat[b + 1]) * ny
+                    distance += (z - flat[b + 2]) * nz
+                else:
+                    turns = 2
+                    distance, nx, ny, nz, where = nearest(kinds[s], data[s], x, y, z)
                 if (where == FACE) != (turn == 0):
                     continue
                 w = wall[s]
@@ -276,7 +287,7 @@ def wall_forces(
                     seen[number, 3], seen[number, 4], seen[number, 5] = nx, ny, nz
                     seen[number, 6] = where
                     number += 1
-                m = wall_motion[w]
+                m = 9 * w
                 c = filled
                 who[c], who[c + col.SIZE], who[c + 2 * col.SIZE] = i, w, k
                 work[col.NX, c], work[col.NY, c], work[col.NZ, c], work[col.OVERLAP, c] = (
@@ -286,16 +297,24 @@ def wall_forces(
                     overlap,
                 )
                 # Velocity relative to the wall at the contact.
-                lx, ly, lz = qx - m[6], qy - m[7], qz - m[8]
-                work[col.UX, c] = motion[i, 0] - (m[0] + m[4] * lz - m[5] * ly)
-                work[col.UY, c] = motion[i, 1] - (m[1] + m[5] * lx - m[3] * lz)
-                work[col.UZ, c] = motion[i, 2] - (m[2] + m[3] * ly - m[4] * lx)
+                lx, ly, lz = qx - moves[m + 6], qy - moves[m + 7], qz - moves[m + 8]
+                work[col.UX, c] = motion[i, 0] - (moves[m] + moves[m + 4] * lz - moves[m + 5] * ly)
+                work[col.UY, c] = motion[i, 1] - (
+                    moves[m + 1] + moves[m + 5] * lx - moves[m + 3] * lz
+                )
+                work[col.UZ, c] = motion[i, 2] - (
+                    moves[m + 2] + moves[m + 3] * ly - moves[m + 4] * lx
+                )
                 work[col.IX, c], work[col.IY, c], work[col.IZ, c] = (
                     motion[i, 3],
                     motion[i, 4],
                     motion[i, 5],
                 )
-                work[col.JX, c], work[col.JY, c], work[col.JZ, c] = m[3], m[4], m[5]
+                work[col.JX, c], work[col.JY, c], work[col.JZ, c] = (
+                    moves[m + 3],
+                    moves[m + 4],
+                    moves[m + 5],
+                )
                 work[col.R_EFF, c], work[col.M_EFF, c], work[col.INERTIA, c] = r, mass, mass * r * r
                 work[col.ARM_I, c], work[col.ARM_J, c] = r - 0.5 * overlap, 0.0
                 work[col.AREA, c] = math.pi * (r * r - distance * distance)

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from greybed.dem.measure_tables import ShearTable, SlipTable, SolidTable
-from greybed.dem.simulation import Simulation
 
 if TYPE_CHECKING:
     from greybed.dem.case import ParticleCase
+    from greybed.dem.samples import State
 
 History = Sequence[Mapping[str, float]]
 
 
-def measured(case: ParticleCase, simulation: Simulation) -> dict[str, float]:
+def measured(case: ParticleCase, simulation: State) -> dict[str, float]:
     """What a row of the history says: masses in boxes, tilt of planes and mean speed along them."""
     row: dict[str, float] = {}
     x, masses = simulation.centres, simulation.masses
@@ -32,12 +32,9 @@ def measured(case: ParticleCase, simulation: Simulation) -> dict[str, float]:
     return row
 
 
-def _slip(simulation: Simulation, name: str) -> tuple[float, float]:
+def _slip(simulation: State, name: str) -> tuple[float, float]:
     """Angle between a plane's normal and the upward vertical [degrees], mean speed on it [m/s]."""
-    number = [wall.shape.name for wall in simulation.walls].index(name)
-    surfaces = simulation._lists.surfaces
-    normal = surfaces.data[list(surfaces.wall).index(number), 3:6]
-    motion = surfaces.motion[number]
+    normal, motion = simulation.plane_of(name)
     moves = motion[:3] + np.cross(motion[3:6], simulation.centres - motion[6:9])
     along = simulation.velocities - moves
     along = along - np.outer(along @ normal, normal)

@@ -55,6 +55,8 @@ class ParticleCase:
     most_overlap: float = quantity("dimensionless", 0.3, above=0.0, at_most=1.0)  # [-]
     # Times between two looks at streams, sinks and servo walls [s].
     look: float | None = quantity("time", None, above=0.0)
+    # Pairs nearer than it are listed [m]; a quarter of the mean radius by default.
+    skin: float | None = quantity("length", None, above=0.0)
     law: LawTable = field(default_factory=LawTable)
     material: tuple[MaterialTable, ...] = rows(MaterialTable)
     contact: tuple[ContactTable, ...] = rows(ContactTable)

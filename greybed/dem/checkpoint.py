@@ -19,7 +19,7 @@ from greybed.dem._rigid import Rigid
 from greybed.dem.lists import Lists
 from greybed.dem.simulation import Simulation
 
-FORMAT = "greybed-particles-2"
+FORMAT = "greybed-particles-3"
 
 
 def save(

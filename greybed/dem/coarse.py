@@ -32,7 +32,15 @@ import math
 from dataclasses import fields, replace
 
 from greybed.core.errors import InputError
-from greybed.core.sizes import Discrete, LogNormal, Mono, RosinRammler, Uniform, parse_sizes
+from greybed.core.sizes import (
+    Discrete,
+    LogNormal,
+    MassQuantiles,
+    Mono,
+    RosinRammler,
+    Uniform,
+    parse_sizes,
+)
 from greybed.dem.case import ParticleCase
 from greybed.dem.case_tables import FileTable, PackTable, StreamTable
 from greybed.dem.laws import ContactLaw
@@ -139,6 +147,8 @@ def coarse_sizes(text: str, factor: float) -> str:
             return f"lognormal:{length(median)},{sd!r}"
         case RosinRammler(scale, spread):
             return f"rosin-rammler:{length(scale)},{spread!r}"
+        case MassQuantiles(d10, d50, d90):
+            return f"quantiles:D10={length(d10)},D50={length(d50)},D90={length(d90)}"
         case Discrete(radii, shares):
             rows = zip(radii, shares, strict=True)
             return "discrete:" + ",".join(f"{length(r)}={s!r}" for r, s in rows)

@@ -164,6 +164,27 @@ class Heat:
                 "this checkpoint holds no temperatures; give the case that wrote it."
             ) from None
 
+    def give(self, heat: ArrayLike) -> None:
+        """Add heat to the particles, shape (n,), in the order of ``simulation.centres`` [J].
+
+        Raises
+        ------
+        InputError
+            If it is not one finite number for each, or takes a temperature to 0 or below.
+        """
+        given = np.asarray(heat, dtype=np.float64)
+        t = self.temperatures
+        if given.shape != t.shape or not np.isfinite(given).all():
+            raise InputError(f"heat of shape {given.shape} must be {t.shape}, all finite [J].")
+        after = t + given / self.capacities
+        if not (after > 0.0).all():
+            who = int(after.argmin())
+            raise InputError(
+                f"particle {who}: heat of {given[who]:.3g} [J] takes it from {t[who]:.4g} to "
+                f"{after[who]:.4g} [K]; take a smaller time step."
+            )
+        self._by_label[self.simulation.labels] = after
+
     def advance(self, time: float) -> None:
         """Let heat flow for a time through the contacts of now [s].
 

@@ -95,6 +95,8 @@ class Lists:
         """Take in particles that touch nothing, numbered after those that are there."""
         m = len(more.place)
         self.ident = np.concatenate([self.ident, np.arange(m) + len(self.ident)])
+        if len(self.state.outer):  # nothing pushes those that come, until it is said
+            more = more._replace(outer=np.zeros((m, 6)))
         self.state = joined_states([self.state, more])
         new_bodies = np.arange(len(bodies.pose)) + len(self.rigid.pose)
         self.body_ident = np.concatenate([self.body_ident, new_bodies])
@@ -189,6 +191,7 @@ class Lists:
         self.state = _step.State(
             place, old.motion[order], old.load[order], old.kind[order], place[:, :3].copy(),
             old.fixed[order], old.body[order],
+            old.outer[order] if len(old.outer) else old.outer,
         )  # fmt: skip
         if len(self.rigid.pose):
             self._renew_bodies(order, len(old.place))

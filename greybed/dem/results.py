@@ -18,12 +18,13 @@ from greybed.dem.measure_tables import (
     SlipTable,
     StressTable,
 )
-from greybed.dem.runner import ParticleRun
+from greybed.dem.samples import Run
+from greybed.dem.simulation import Simulation
 from greybed.dem.slopes import mean_slope, slope_now
 from greybed.dem.stress import stress_in
 
 
-def results_of(run: ParticleRun) -> dict[str, Any]:
+def results_of(run: Run) -> dict[str, Any]:
     """Plain numbers of a run, with units in their names, for ``summary.json``."""
     sim, case, tally = run.simulation, run.case, run.tally
     last = tally.history[-1]
@@ -47,7 +48,7 @@ def results_of(run: ParticleRun) -> dict[str, Any]:
                 "reach_m": clump.reach,
                 **clump.shape_error,
             }
-            for name, clump in run.feed.shapes.items()
+            for name, clump in run.shapes.items()
         },
         "bytes_per_particle": sim.bytes_per_particle,
         **({"heat": heat_results(case, run.heat, tally.history)} if run.heat else {}),
@@ -63,7 +64,7 @@ def results_of(run: ParticleRun) -> dict[str, Any]:
     }
 
 
-def _flow(run: ParticleRun, sink: str) -> dict[str, float | None]:
+def _flow(run: Run, sink: str) -> dict[str, float | None]:
     """Mean rates into a sink while it takes its second to eighth tenth."""
     rows = run.tally.history
     time = np.array([row["time [s]"] for row in rows])
@@ -77,7 +78,7 @@ def _flow(run: ParticleRun, sink: str) -> dict[str, float | None]:
     return rates
 
 
-def _measure(run: ParticleRun, table: Any) -> dict[str, Any]:
+def _measure(run: Run, table: Any) -> dict[str, Any]:
     sim = run.simulation
     x, r = sim.centres, sim.radii
     if isinstance(table, PileTable):
@@ -94,6 +95,7 @@ def _measure(run: ParticleRun, table: Any) -> dict[str, Any]:
             "intensity_of_segregation": None if math.isnan(intensity) else intensity,
         }
     if isinstance(table, StressTable):
+        assert isinstance(sim, Simulation)  # no other engine tells its contacts
         tensor = stress_in(sim, table.lower, table.upper)
         return {"stress_Pa": tensor.tolist(), "pressure_Pa": float(np.trace(tensor)) / 3.0}
     if isinstance(table, ShearTable):
@@ -102,6 +104,7 @@ def _measure(run: ParticleRun, table: Any) -> dict[str, Any]:
         return slip_result(table, run.tally.history)
     if isinstance(table, ConductionTable):
         assert run.heat is not None  # the case has been checked
+        assert isinstance(sim, Simulation)
         return conduction(table, sim, run.heat, run.tally.history)
     density = np.array([material.density for material in sim.materials])[sim.kinds]
     field = measures.solid_field(

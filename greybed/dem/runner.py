@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,16 +13,15 @@ from numpy.typing import NDArray
 
 from greybed.core.errors import InputError
 from greybed.core.packing import Packing
-from greybed.dem.bulk_tests import measured
 from greybed.dem.case import ParticleCase
 from greybed.dem.case_heat import heat_of, sample_of, start_of
 from greybed.dem.case_tables import BoundsTable, FileTable, PackTable, StreamTable
 from greybed.dem.checkpoint import restore, save
+from greybed.dem.clump import Clump
 from greybed.dem.coarse import coarse_case
 from greybed.dem.feeding import Feed
-from greybed.dem.measures import bed_height
+from greybed.dem.samples import Tally, sample
 from greybed.dem.simulation import Simulation
-from greybed.dem.slopes import slopes
 
 Array = NDArray[np.float64]
 
@@ -31,37 +29,6 @@ Array = NDArray[np.float64]
 LOOK = 200
 # Share of its velocity that a servo wall changes by at each look.
 _SERVO = 0.2
-
-
-@dataclass
-class Tally:
-    """What has come and gone, kept with each checkpoint.
-
-    Attributes
-    ----------
-    streamed : list of float
-        Mass that each table of particles has put in [kg].
-    inserted : list of int
-        Particles of each table.
-    batches : list of int
-        Batches of each table, for the random numbers of the next one.
-    sunk : list of float
-        Mass that each sink has taken [kg].
-    taken : list of int
-        Particles of each sink.
-    servo : list of float
-        Present share of its velocity of each wall with a servo.
-    history : list of dict
-        Samples.
-    """
-
-    streamed: list[float]
-    inserted: list[int]
-    batches: list[int]
-    sunk: list[float]
-    taken: list[int]
-    servo: list[float]
-    history: list[dict[str, float]] = field(default_factory=list)
 
 
 class ParticleRun:
@@ -123,7 +90,7 @@ class ParticleRun:
             x, r, self._materials, case.contacts(used), kinds=kind, kinds_to_come=len(used),
             law=case.contact_law, walls=case.walls, gravity=case.gravity, time_step=step,
             velocities=v, clumps=[batch.clumps for batch in batches if batch.shape is not None],
-            most_overlap=case.most_overlap, threads=threads,
+            most_overlap=case.most_overlap, threads=threads, skin=case.skin,
             box=None if periodic is None else [periodic.lower, periodic.upper],
             periodic=(False,) * 3 if periodic is None
             else ("x" in periodic.axes, "y" in periodic.axes, "z" in periodic.axes),
@@ -141,6 +108,11 @@ class ParticleRun:
         if not self.tally.history:
             self._note()
 
+    @property
+    def shapes(self) -> dict[str, Clump]:
+        """Shapes of clumps, by name."""
+        return self.feed.shapes
+
     # -- time -------------------------------------------------------------------------------
 
     def go_on(self, until: int | None = None) -> Iterator[int]:
@@ -156,11 +128,15 @@ class ParticleRun:
                 return
             stop = min(end, (before // self.look + 1) * self.look)
             stop = min(stop, (before // self._sample + 1) * self._sample)
-            sim.run(stop - before)
+            self._move(stop - before)
             self._warm()
             if sim.steps % self._sample == 0 or sim.steps == self.steps:
                 self._note()
             yield sim.steps - before
+
+    def _move(self, steps: int) -> None:
+        """Let the particles run; what else moves with them is the affair of other runs."""
+        self.simulation.run(steps)
 
     def _warm(self) -> None:
         """Let heat catch up, at looks and at the end only: a stop between them changes no bit."""
@@ -245,27 +221,7 @@ class ParticleRun:
 
     def _note(self) -> None:
         """A sample of the history."""
-        sim, e = self.simulation, self.simulation.energies
-        row = {
-            "time [s]": sim.time,
-            "particles [-]": float(sim.count_of()),
-            "mass [kg]": float(sim.masses.sum()),
-            "kinetic energy [J]": e.kinetic,
-            "rotational energy [J]": e.rotational,
-            "potential energy [J]": e.potential,
-            "height [m]": bed_height(sim.centres, sim.radii),
-            "coordination [-]": sim.coordination,
-        }
-        for sink, mass, count in zip(
-            self.case.sink, self.tally.sunk, self.tally.taken, strict=True
-        ):
-            row[f"mass in {sink.name} [kg]"] = mass
-            row[f"particles in {sink.name} [-]"] = float(count)
-        for wall, force in zip(self.case.wall, sim.wall_forces, strict=True):
-            for axis, value in zip("xyz", force, strict=True):
-                row[f"force {axis} on {wall.name} [N]"] = float(value)
-        row |= slopes(self.case, sim)
-        row |= measured(self.case, sim)
+        row = sample(self.case, self.simulation, self.tally)
         if self.heat is not None:
             row |= sample_of(self.case, self.heat)
         self.tally.history.append(row)
@@ -274,8 +230,16 @@ class ParticleRun:
 
     def save(self, path: str | os.PathLike[str], **extra: Any) -> Path:
         """Write a checkpoint, with the tallies and what else is given."""
-        heat = None if self.heat is None else self.heat.state()
-        return save(self.simulation, path, beside=heat, tally=vars(self.tally), **extra)
+        return save(self.simulation, path, beside=self._beside(), tally=vars(self.tally), **extra)
+
+    def _beside(self) -> dict[str, NDArray[Any]]:
+        """Arrays that go into a checkpoint beside the particles."""
+        return {} if self.heat is None else dict(self.heat.state())
+
+    def _take_up(self, beside: dict[str, NDArray[Any]]) -> None:
+        """Take up what :meth:`_beside` has given."""
+        if self.heat is not None:
+            self.heat.go_back(beside)
 
     def restore(self, path: str | os.PathLike[str]) -> dict[str, Any]:
         """Go back to a checkpoint; returns what else was given to :meth:`save`."""
@@ -283,9 +247,7 @@ class ParticleRun:
         self.tally = Tally(**extra.pop("tally"))
         self.feed.streamed, self.feed.inserted = self.tally.streamed, self.tally.inserted
         self.feed.batches = self.tally.batches
-        beside = extra.pop("beside", {})
-        if self.heat is not None:
-            self.heat.go_back(beside)
+        self._take_up(extra.pop("beside", {}))
         return extra
 
 

@@ -215,6 +215,36 @@ class Simulation(Population):
             self._pending = False
         self._check_overlaps()
 
+    def push(self, forces: ArrayLike, torques: ArrayLike | None = None) -> None:
+        """Push the particles from without, until the next call, besides contacts and gravity.
+
+        Over a run of N steps a push gives N time steps times its force, whatever the contacts do.
+
+        Parameters
+        ----------
+        forces : array_like, shape (n, 3)
+            Forces through the centres, in the order of the input [N].
+        torques : array_like, shape (n, 3), optional
+            Torques about the centres, 0 by default [N m].
+
+        Raises
+        ------
+        InputError
+            If they are not finite, or not one for each particle.
+        """
+        n = len(self._state.place)
+        outer = np.zeros((n, 6))
+        for column, name, values in ((0, "forces", forces), (3, "torques", torques)):
+            if values is None:
+                continue
+            given = np.asarray(values, dtype=np.float64)
+            if given.shape != (n, 3) or not np.isfinite(given).all():
+                raise InputError(f"{name} of shape {given.shape} must be ({n}, 3), all finite.")
+            outer[:, column : column + 3] = given[self._lists.ident]
+        # The next half kick is with the loads of now.
+        self._state.load[:, :6] += outer - self._state.outer if len(self._state.outer) else outer
+        self._state = self._lists.state = self._state._replace(outer=outer)
+
     # -- inside -----------------------------------------------------------------------------
 
     def _tables(

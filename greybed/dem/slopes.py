@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from greybed.core.errors import InputError
 from greybed.dem import measures
-from greybed.dem.case import ParticleCase
 from greybed.dem.measure_tables import PileTable
-from greybed.dem.simulation import Simulation
+
+if TYPE_CHECKING:
+    from greybed.dem.case import ParticleCase
+    from greybed.dem.samples import State
 
 
-def slope_now(simulation: Simulation, table: PileTable) -> dict[str, Any]:
+def slope_now(simulation: State, table: PileTable) -> dict[str, Any]:
     """Profile of a surface, and its angle; ``angle_deg`` is None with ``why`` where it has none."""
     x, r = simulation.centres, simulation.radii
     chosen = (x[:, 2] > table.above) & (x[:, 2] < table.below)
@@ -37,7 +39,7 @@ def slope_now(simulation: Simulation, table: PileTable) -> dict[str, Any]:
     return {**found, "angle_deg": angle, "angle_stderr_deg": error}
 
 
-def slopes(case: ParticleCase, simulation: Simulation) -> dict[str, float]:
+def slopes(case: ParticleCase, simulation: State) -> dict[str, float]:
     """Angles that are to be averaged, for a row of the history [degrees]; NaN where there is none.
 
     Rows are kept with each checkpoint, so a run that goes on has the same mean.

@@ -11,6 +11,7 @@ from greybed.dem import _columns, _step
 from greybed.dem.bodies import Bodies, shown, sorted_bodies, turns
 from greybed.dem.lists import Lists
 from greybed.dem.particles import Energies
+from greybed.dem.walls import SolidWall
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -22,6 +23,7 @@ class Views:
     _state: _step.State
     _lists: Lists
     gravity: Array
+    walls: tuple[SolidWall, ...]
     steps: int
     time_step: float
 
@@ -106,18 +108,29 @@ class Views:
 
     @property
     def forces(self) -> Array:
-        """Contact forces without gravity, shape (n, 3) [N]."""
-        return self._in_order(self._state.load[:, :3])
+        """Contact forces without gravity and pushes, shape (n, 3) [N]."""
+        return self._in_order(self._contact_loads()[:, :3])
 
     @property
     def torques(self) -> Array:
-        """Contact torques, shape (n, 3) [N m]."""
-        return self._in_order(self._state.load[:, 3:6])
+        """Contact torques without pushes, shape (n, 3) [N m]."""
+        return self._in_order(self._contact_loads()[:, 3:])
+
+    def _contact_loads(self) -> Array:
+        load, outer = self._state.load[:, :6], self._state.outer
+        return load - outer if len(outer) else load
 
     @property
     def wall_forces(self) -> Array:
         """Forces on the walls, shape (walls, 3) [N]."""
         return self._lists.surfaces.force[:, :, :3].sum(axis=0)
+
+    def plane_of(self, name: str) -> tuple[Array, Array]:
+        """Normal of a plane, shape (3,), and its velocity, spin and centre, shape (9,)."""
+        number = [wall.shape.name for wall in self.walls].index(name)
+        surfaces = self._lists.surfaces
+        at = list(surfaces.wall).index(number)
+        return surfaces.data[at, 3:6].copy(), surfaces.motion[number].copy()
 
     @property
     def energies(self) -> Energies:

@@ -120,3 +120,15 @@ def test_bad_faces_are_refused():
     tx[0, 0, 3] = np.nan
     with pytest.raises(InputError, match="finite"):
         Poisson(tx, ty, tz, (False,) * 3)
+
+
+@pytest.mark.parametrize("shape", [(26, 1, 12), (12, 26, 1)])
+def test_planes_that_stand_upright(shape):
+    periodic = (shape[2] > 1, False, False)
+    t = faces(shape, periodic, spread=0.6)
+    t[2][-1] = 2.0
+    b = np.random.default_rng(1).standard_normal(shape)
+    found, _ = Poisson(*t, periodic).solve(b, tolerance=1e-11)
+    exact = direct(shape, t, periodic, b)[1]()
+    assert found.shape == shape
+    assert abs(found - exact).max() < 1e-9 * abs(exact).max()

@@ -120,6 +120,7 @@ def test_counts_masses_and_sizes_of_a_coarse_case():
     assert coarse_case(same) is same
     for text in (
         "mono:2mm", "uniform:1mm,2mm", "lognormal:2mm,1.2", "rosin-rammler:2mm,3",
+        "quantiles:D10=2mm,D50=3mm,D90=4mm",
         "discrete:1mm=0.3,2mm=0.7",
     ):  # fmt: skip
         np.testing.assert_allclose(

@@ -125,6 +125,21 @@ def test_a_silo_fills_opens_and_empties(tmp_path):
     assert below[-1] == 0.0
 
 
+def test_a_skin_moves_nobody(tmp_path):
+    places, bytes_each = [], []
+    for skin in ("0.1 mm", "2 mm"):
+        run = ParticleRun(
+            case_of(tmp_path, SILO.replace("seed = 3", f'seed = 3\nskin = "{skin}"')), {}, threads=1
+        )
+        for _ in run.go_on(until=round(0.08 / run.simulation.time_step)):
+            pass
+        places.append(run.simulation.centres)
+        bytes_each.append(run.simulation.bytes_per_particle)
+    # Forces are added in another order: to round-off, grown by the collisions of 80 ms.
+    np.testing.assert_allclose(places[0], places[1], atol=1e-9)
+    assert bytes_each[1] > 1.2 * bytes_each[0]
+
+
 def test_a_stopped_run_goes_on_with_the_same_bits(tmp_path):
     whole = ParticleRun(case_of(tmp_path, SILO), {}, threads=2)
     for _ in whole.go_on():

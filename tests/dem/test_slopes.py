@@ -21,7 +21,7 @@ def drum(**change):
     """The drum of the study with few spheres, that turns from the start."""
     content = read_toml(DRUM)
     content |= {"duration": 0.2}
-    content["particles"][0]["count"] = 150
+    content["particles"][0]["count"] = 300
     content["wall"][0]["starts"] = 0.0
     content["measure"][0] |= {"average": 0.1, "width": "6 mm", **change}
     if content["measure"][0]["average"] is None:

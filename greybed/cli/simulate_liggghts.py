@@ -1,0 +1,93 @@
+"""``greybed simulate --engine liggghts``: the same case and the same results, moved by LIGGGHTS."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from greybed.cli.simulate_particles import (
+    CHECKPOINT,
+    Frames,
+    files_of,
+    say,
+    write_history,
+    write_results,
+)
+
+WORK = "liggghts"
+
+
+def run_liggghts(options: argparse.Namespace) -> int:
+    """Run the case that ``options`` names; returns 0."""
+    from greybed.core.errors import InputError
+    from greybed.core.files import output_folder, sole_writer
+    from greybed.core.progress import progress
+    from greybed.core.readers import read_packing
+    from greybed.dem.case import load_particle_case
+    from greybed.dem.liggghts.deck import LOG
+    from greybed.dem.liggghts.run import LiggghtsRun, loops
+
+    if options.threads is not None:
+        raise InputError("--threads is for --engine greybed only; take --ranks, or leave it out.")
+    case = load_particle_case(options.case)
+    files, inputs = files_of(case, options.case)
+    folder = output_folder(options.out)
+    ranks = 1 if options.ranks is None else options.ranks
+    with sole_writer(folder / ".simulate.lock"), _ended_by_signal():
+        packings = {k: read_packing(path) for k, path in files.items()}
+        try:
+            run = LiggghtsRun(case, packings, folder / WORK, ranks=ranks)
+            # A checkpoint of our own engine in this folder is of other results.
+            (folder / CHECKPOINT).unlink(missing_ok=True)
+            frames = Frames(run, folder, options.movie)
+            frames.clear()
+            begin, moved, count = time.perf_counter(), 0, len(run.simulation.rows)
+            with progress(run.steps, "time steps", show=not options.quiet) as advance:
+                for done in run.go_on(advance):
+                    moved += done * count
+                    count = len(run.simulation.rows)
+                    step = run.simulation.steps
+                    if step == 0 or frames.due(step, done):
+                        frames.write()
+                    write_history(folder / "history.csv", run)
+        except InputError as error:
+            raise InputError(f"{options.case}: {error}") from None
+        seconds = time.perf_counter() - begin
+        results = _results(run, moved, seconds, loops(folder / WORK / LOG))
+        summary = write_results(folder, run, frames, results, inputs)
+    say(results, folder)
+    print(f"wrote {summary}")
+    return 0
+
+
+def _results(run: Any, moved: int, seconds: float, in_loops: float) -> dict[str, Any]:
+    from greybed.dem.results import results_of
+
+    return {
+        **results_of(run),
+        "engine": "liggghts",
+        "engine_version": run.version,
+        "ranks": run.ranks,
+        "seconds": seconds,
+        "seconds_in_loops": in_loops,
+        "particle_steps_per_second": moved / seconds if moved else None,
+    }
+
+
+@contextmanager
+def _ended_by_signal() -> Iterator[None]:
+    """Let SIGTERM end us in order, so that LIGGGHTS does not stay behind."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)

@@ -1,0 +1,163 @@
+"""Settings of the exchange between gas and particles, and the drag of each particle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from greybed.closures.drag import MIXTURES, DragLaw, drag_law, mixture_factor, sauter_mean
+from greybed.core.errors import InputError
+from greybed.coupling.forces import LIFTS
+from greybed.coupling.void_fraction import METHODS
+
+Array = NDArray[np.float64]
+
+TREATMENTS = ("explicit", "semi-implicit", "implicit")
+
+Correction = Callable[[Array, Array, float], Array]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """How gas and particles act on each other.
+
+    Parameters
+    ----------
+    drag : str, DragLaw or callable
+        A name in ``greybed.closures.drag.LAWS``, a law, or ``F(phi, re)`` of arrays.
+    treatment : str
+        ``explicit``: force of the old velocities. ``semi-implicit``: of the new gas velocity.
+        ``implicit``: also of the particle's own new velocity, with the slope of the law, so that
+        no time step is too long for it.
+    width : float
+        Smoothing of void fraction and exchange, in mean diameters; cells wider than it are not
+        smoothed [-].
+    void : str
+        ``exact`` or ``centre``: where a particle's volume is counted.
+    least_void : float
+        Void fractions below it are taken as it [-].
+    mixture : str
+        How sizes share drag: ``none`` (each as if all were of its size), ``bvk``,
+        ``yin-sundaresan``.
+    pressure : bool
+        Whether the pressure gradient acts on particles.
+    buoyancy : bool
+        Whether the gas's weight lifts particles where its pressure leaves that out.
+    added_mass : float
+        Coefficient, 0.5 for spheres, 0 for none [-].
+    lift : str
+        ``none`` or ``saffman-mei``.
+    correction : callable, optional
+        ``H(phi, slip, size)`` for solid fractions (n,), slips (n, 3) and the edge of a cube of a
+        cell's volume [m]: the share of drag that is kept, as filtered models give it.
+
+    Raises
+    ------
+    InputError
+        For a name that is not known or a number out of range.
+    """
+
+    drag: str | DragLaw | Callable[[Array, Array], Array] = "bvk"
+    treatment: str = "semi-implicit"
+    width: float = 3.0
+    void: str = "exact"
+    least_void: float = 0.2
+    mixture: str = "none"
+    pressure: bool = True
+    buoyancy: bool = True
+    added_mass: float = 0.0
+    lift: str = "none"
+    correction: Correction | None = None
+
+    def __post_init__(self) -> None:
+        for name, known in (
+            ("treatment", TREATMENTS), ("void", METHODS), ("mixture", MIXTURES), ("lift", LIFTS),
+        ):  # fmt: skip
+            if getattr(self, name) not in known:
+                raise InputError(
+                    f"{name} = {getattr(self, name)!r} is not known; known are {', '.join(known)}."
+                )
+        for name, low, high in (
+            ("width", 0.0, 1e3), ("least_void", 0.01, 0.99), ("added_mass", 0.0, 10.0),
+        ):  # fmt: skip
+            value = getattr(self, name)
+            if not (math.isfinite(value) and low <= value <= high):
+                raise InputError(f"{name} = {value:g} [-] must lie in {low:g} ... {high:g}.")
+        if isinstance(self.drag, str):
+            drag_law(self.drag)
+
+    @property
+    def law(self) -> DragLaw | Callable[[Array, Array], Array]:
+        """The drag law itself."""
+        return drag_law(self.drag) if isinstance(self.drag, str) else self.drag
+
+
+@dataclass(frozen=True, eq=False)
+class DragTerms:
+    """Drag of each particle as k times slip.
+
+    Attributes
+    ----------
+    coefficient : array, shape (n,)
+        k [N s/m].
+    steepness : array, shape (n,)
+        Slope of the force over the slip, over k [-].
+    void, reynolds : array, shape (n,)
+        Void fraction and Re [-].
+    outside : float
+        Share of particles outside the data of the law [-].
+    """
+
+    coefficient: Array
+    steepness: Array
+    void: Array
+    reynolds: Array
+    outside: float
+
+    def over(self, void: Array) -> DragTerms:
+        """The same over the void fraction, as model B has it."""
+        return replace(self, coefficient=self.coefficient / void)
+
+
+def drag_terms(
+    settings: Settings, slip: Array, void: Array, d: Array, density: float, viscosity: float,
+    size: float,
+) -> DragTerms:  # fmt: skip
+    """Drag of particles with slips (n, 3) [m/s], void fractions (n,) [-] and diameters (n,) [m]."""
+    if not len(d):
+        return DragTerms(np.zeros(0), np.ones(0), void, np.zeros(0), 0.0)
+    phi = 1.0 - void
+    speed = np.sqrt((slip**2).sum(axis=1))
+    mean = d if settings.mixture == "none" else np.full_like(d, sauter_mean(d))
+    re = void * density * mean * speed / viscosity
+    law = settings.law
+    outside = 0.0
+    if isinstance(law, DragLaw):
+        force, slope = law.with_slope(phi, re)
+        outside = float(law.outside(phi, re).mean())
+    else:
+        force = np.asarray(law(phi, re), dtype=np.float64)
+        further = 1e-3 * np.maximum(re, 1e-6)
+        slope = re * (np.asarray(law(phi, re + further)) - force) / further
+    if settings.mixture != "none":
+        before = force
+        force = mixture_factor(settings.mixture, force, phi, d / mean)
+        slope = slope * force / before
+    if not (np.isfinite(force).all() and (force >= 0.0).all()):
+        who = int((~(np.isfinite(force) & (force >= 0.0))).argmax())
+        raise InputError(
+            f"the drag law gives F = {force[who]:g} at a solid fraction of {phi[who]:.3g} and Re = "
+            f"{re[who]:.3g} [-]; F must be finite and at least 0: take another law."
+        )
+    coefficient = 3.0 * math.pi * viscosity * d * void * force
+    if settings.correction is not None:
+        kept = np.asarray(settings.correction(phi, slip, size), dtype=np.float64)
+        if kept.shape != phi.shape or not (np.isfinite(kept).all() and (kept >= 0.0).all()):
+            raise InputError("the drag correction must give one finite number >= 0 per particle.")
+        coefficient = coefficient * kept
+    steepness = 1.0 + np.divide(slope, force, out=np.zeros_like(force), where=force > 0.0)
+    return DragTerms(coefficient, np.maximum(steepness, 0.5), void, re, outside)
