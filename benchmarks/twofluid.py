@@ -1,20 +1,20 @@
 """Two fluids: cell steps per second against twoPhaseEulerFoam (Debian's OpenFOAM), one core each.
 
-python benchmarks/twofluid.py               128 x 512 cells, 60 steps in the clock
-python benchmarks/twofluid.py --steps 200
+python benchmarks/twofluid.py               128 x 512 cells, 40 steps in the clock
+python benchmarks/twofluid.py --outer 3     with three outer correctors, as its tutorial has them
 
-Gas-particle flow of 75 um FCC particles in a box that repeats along x, with gas coming in at the
-bottom and a pressure outlet at the top: twoPhaseEulerFoam's p_rgh knows no mean pressure gradient,
-so a box that repeats along y as well cannot be run in it. Both get the same cloudy start with all
-digits, the same step and number of steps; Gidaspow's drag, kinetic theory with the temperature in
-equilibrium, the same viscosity, radial distribution, frictional pressure and limiters, Euler in
-time. OpenFOAM runs what costs it least: one outer and one pressure corrector, one alpha cycle, and
-for the pressure the fastest of GAMG and PCG, to a tolerance that leaves about the same local
-continuity error as here (both are printed). Its clock is what its own steps report, and ours is
-around the same steps: reading, writing and compiling are in neither. It always assembles two energy
-equations; their share (its own profiling) is taken off its time. Afterwards the solids' mean
-velocity, the slip and the variance of the solid fraction must agree. The last line is the median of
-the ratios of the pairs.
+Gas and particles of 75 um in a box that repeats along x, with gas coming in at the bottom and a
+pressure outlet at the top: twoPhaseEulerFoam's p_rgh knows no mean pressure gradient, so a box that
+repeats along y as well cannot be run in it. Both get the same cloudy start with all digits, the
+same step and number of steps; Gidaspow's drag, kinetic theory with its temperature in equilibrium,
+the same viscosity, radial distribution and frictional pressure, van Leer's limiter (limitedLinear
+for momentum there), Euler in time. OpenFOAM runs what costs it least: one outer and one pressure
+corrector, one alpha cycle, and for the pressure the faster of GAMG and PCG, to a tolerance that
+leaves about the same local continuity error as here (both are printed). It always assembles two
+energy equations, which we have not; their linear solves are 4 % of its time, and stay in. Both
+clocks are processor time: its own of each step, ours around the same steps; reading, writing and
+compiling are in neither. Afterwards the solids' mean velocity, the slip and the deviation of the
+solid fraction must agree. The last line is the median of the ratios of the pairs.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ SOLVERS = {
     "GAMG": "solver GAMG; smoother DIC;",
     "PCG": "solver PCG; preconditioner DIC;",
 }
-# What must agree after the steps: mean velocities over the slip, and the variance of phi.
-SAME_VELOCITY, SAME_VARIANCE = 0.03, 0.03
+# What must agree after the steps: mean velocities over the slip, and the deviation of phi.
+SAME_VELOCITY, SAME_DEVIATION = 0.02, 0.01
 
 
 @dataclass
@@ -172,7 +172,7 @@ divSchemes {
  "div\\(alphaPhi.*,p\\)" Gauss limitedLinear 1;
  "div\\(alphaRhoPhi.*,Theta.*\\)" Gauss limitedLinear 1;
  div((((alpha.air*thermo:rho.air)*nuEff.air)*dev2(T(grad(U.air))))) Gauss linear;
- div((((thermo:rho.particles*nut.particles)*dev2(T(grad(U.particles))))+(((thermo:rho.particles*lambda.particles)*div(phi.particles))*I))) Gauss linear;
+ "div\\(\\(\\(\\(thermo:rho.particles\\*nut.*" Gauss linear;
 }
 laplacianSchemes { default Gauss linear uncorrected; bounded Gauss linear uncorrected; }
 interpolationSchemes { default linear; }
@@ -190,7 +190,7 @@ snGradSchemes { default uncorrected; bounded uncorrected; }
  "(h|e).*" {{ {smooth} tolerance 1e-6; }}
  "Theta.*" {{ {smooth} tolerance 1e-6; }}
 }}
-PIMPLE {{ nOuterCorrectors 1; nCorrectors 1; nNonOrthogonalCorrectors 0; }}
+PIMPLE {{ nOuterCorrectors {options.outer}; nCorrectors 1; nNonOrthogonalCorrectors 0; }}
 relaxationFactors {{ equations {{ ".*" 1; }} }}
 """
     )
@@ -262,7 +262,8 @@ pMin 10000;
     field(folder, "U.air", "vector", speed, f"uniform (0 {INFLOW / (1 - MEAN)!r} 0)",
           f"bottom {{ type interstitialInletVelocity; inletVelocity uniform (0 {INFLOW} 0); "
           f"alpha alpha.air; value uniform (0 {INFLOW} 0); }}\n"
-          "top { type pressureInletOutletVelocity; phi phi.air; value uniform (0 0 0); }")  # fmt: skip
+          "top { type pressureInletOutletVelocity; phi phi.air; value uniform (0 0 0); }",
+    )  # fmt: skip
     pressure = "[1 -1 -2 0 0 0 0]"
     field(folder, "p", "scalar", pressure, "uniform 1e5",
           '"bottom|top" { type calculated; value uniform 1e5; }')  # fmt: skip
@@ -289,12 +290,31 @@ def foam(command: str, folder: Path) -> str:
     return done.stdout
 
 
-def read_field(path: Path, width: int) -> np.ndarray:
+def read_field(path: Path, width: int, part: str = "internalField") -> np.ndarray:
     text = path.read_text()
-    found = re.search(r"internalField\s+nonuniform List<\w+>\s*\d+\s*\((.*?)\n\)", text, re.S)
+    text = text[text.index(part) :]
+    found = re.search(r"nonuniform List<\w+>\s*\d+\s*\((.*?)\n\)", text, re.S)
     if found is None:
         raise SystemExit(f"{path} holds no list of values")
     return np.array(found[1].replace("(", " ").replace(")", " ").split(), float).reshape(-1, width)
+
+
+def local_continuity(path: Path) -> float:
+    """Mean volume that a cell creates in a step, over its own, from the fluxes of both phases."""
+    inner = iter(read_field(path, 1)[:, 0].tolist())
+    fx, fy = np.zeros((NY, NX + 1)), np.zeros((NY + 1, NX))
+    for j in range(NY):
+        for i in range(NX):
+            if i < NX - 1:
+                fx[j, i + 1] = next(inner)
+            if j < NY - 1:
+                fy[j + 1, i] = next(inner)
+    left, right, bottom, top = (
+        read_field(path, 1, f"    {side}\n")[:, 0] for side in ("left", "right", "bottom", "top")
+    )
+    fx[:, 0], fx[:, -1], fy[0], fy[-1] = -left, right, -bottom, top
+    gone = np.diff(fx, axis=1) + np.diff(fy, axis=0)
+    return STEP * float(np.abs(gone).mean()) / CELL**3
 
 
 def openfoam(phi: np.ndarray, options: argparse.Namespace, solver: str) -> Run:
@@ -315,17 +335,17 @@ def openfoam(phi: np.ndarray, options: argparse.Namespace, solver: str) -> Run:
         alpha = read_field(last / "alpha.particles", 1)[:, 0]
         v = read_field(last / "U.particles", 3)[:, 1]
         u = read_field(last / "U.air", 3)[:, 1]
+        continuity = local_continuity(last / "phi")
         if options.profile:
             for path in folder.rglob("profiling"):
                 print(path.read_text())
     solids = float((alpha * v).sum() / alpha.sum())
     gas = float(((1 - alpha) * u).sum() / (1 - alpha).sum())
-    local = [float(x) for x in re.findall(r"sum local = (\S+),", log)]
     solved = re.findall(r"(\w+):  Solving for p_rgh.*No Iterations (\d+)", log)[-options.steps :]
     return Run(
         1e-6 * phi.size * options.steps / seconds, solids, gas - solids, float(alpha.std()),
-        local[-1] if local else float("nan"),
-        f"{solved[0][0] if solved else solver}, {statistics.mean(int(n) for _, n in solved):.1f} iterations",
+        continuity,
+        f"{solver}, {statistics.mean(int(n) for _, n in solved):.1f} iterations",
     )  # fmt: skip
 
 
@@ -335,9 +355,10 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--pairs", type=int, default=3, help="runs of each, in turn (default 3)")
-    parser.add_argument("--steps", type=int, default=60, help="in the clock (default 60)")
-    parser.add_argument("--warm", type=int, default=20, help="before the clock (default 20)")
+    parser.add_argument("--steps", type=int, default=40, help="in the clock (default 40)")
+    parser.add_argument("--warm", type=int, default=10, help="before the clock (default 10)")
     parser.add_argument("--tolerance", type=float, default=1e-7, help="of OpenFOAM's p_rgh")
+    parser.add_argument("--outer", type=int, default=1, help="OpenFOAM's outer correctors")
     parser.add_argument("--profile", action="store_true", help="OpenFOAM's own profile")
     options = parser.parse_args()
     os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[-1:])
@@ -357,11 +378,20 @@ def main() -> int:
         theirs.append(openfoam(phi, options, best))
         for name, run in (("greybed", mine[-1]), ("OpenFOAM", theirs[-1])):
             print(
-                f"pair {pair + 1}: {name} {run.rate:.4f} M cell steps/s; solids {run.solids:.5f}, slip "
-                f"{run.slip:.5f} m/s, deviation of phi {run.deviation:.6f}, local continuity "
+                f"pair {pair + 1}: {name} {run.rate:.4f} M cell steps/s; solids {run.solids:.5f}, "
+                f"slip {run.slip:.5f} m/s, deviation of phi {run.deviation:.6f}, local continuity "
                 f"{run.continuity:.1e}; {run.note}",
                 flush=True,
             )
+    same = all(
+        abs(a.solids - b.solids) < SAME_VELOCITY * b.slip
+        and abs(a.slip / b.slip - 1.0) < SAME_VELOCITY
+        and abs(a.deviation / b.deviation - 1.0) < SAME_DEVIATION
+        for a, b in zip(mine, theirs, strict=True)
+    )
+    if not same:
+        print("velocities or solid fractions differ: not the same work")
+        return 1
     print(
         f"ratio {statistics.median(a.rate / b.rate for a, b in zip(mine, theirs, strict=True)):.2f}"
     )

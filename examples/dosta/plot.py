@@ -56,6 +56,8 @@ def trends(axes: Any, folder: Path) -> None:
     # With the friction of the case, and only friction or softness changed.
     points: dict[float, list[tuple[float, float, float]]] = {}
     for result, _ in sorted(results(folder, "silo_scaled"), key=softness):
+        if "step" in result["changed"]:
+            continue
         friction = result["changed"].get("friction", 0.3)
         row = (friction, result["rate"] / 1e3, result["rate_error"] / 1e3)
         points.setdefault(round(result["softness"]), []).append(row)
@@ -70,14 +72,18 @@ def trends(axes: Any, folder: Path) -> None:
 
 def drum(axes: Any, folder: Path, reference: dict[str, Any]) -> None:
     known = reference["drum"]
-    for _, path in results(folder, "drum"):
+    for (result, path), style in zip(results(folder, "drum"), ("-", "--", ":", "-."), strict=False):
         table = columns(path)
         t = table["time"] - 0.5
-        axes.plot(t[t >= 0], table["zone2_m1"][t >= 0] / 1e3, color=OURS, label="greybed")
+        changed = result["changed"]
+        label = "".join(f", {k} {v:g}" for k, v in changed.items() if k in ("coarse", "slice"))
+        share = table["zone2_m1"] / result["spheres"][1]
+        axes.plot(t[t >= 0], 30.0 * share[t >= 0], style, color=OURS, label="greybed" + label)
     for name, mark, colour in (("LIGGGHTS", "o", THEIRS), ("MUSEN", "x", OTHERS)):
         axes.plot(known["time"], np.array(known[name]) / 1e3, mark, color=colour, label=name)
-    axes.set(xlabel="time of turning [s]", ylabel="M1 in zone 2 [thousand]", title="Drum")
-    axes.legend(fontsize=8)
+    axes.set(xlabel="time of turning [s]", ylabel="M1 in zone 2 [thousand of 30]", title="Drum")
+    axes.set_ylim(top=33.0)
+    axes.legend(fontsize=8, loc="upper right")
 
 
 def impact(axes: Any, folder: Path, reference: dict[str, Any]) -> None:

@@ -238,7 +238,7 @@ def neighbours(face, x, s, scale, first, total):
 
 @njit(**_OPTIONS)
 def relax(slope, excess, total, nearby, omega, old):
-    """A Chebyshev step of x (1 + slope total) = slope (excess + nearby): ``old`` becomes the new."""
+    """A Chebyshev step of x (1 + slope total) = slope (excess + nearby), into ``old``."""
     for i in range(old.size):
         fresh = slope[i] * (excess[i] + nearby[i]) / (1.0 + slope[i] * total[i])
         old[i] += omega * (fresh - old[i])

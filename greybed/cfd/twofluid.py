@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +13,7 @@ from greybed.cfd.grid import AXES, Grid
 from greybed.cfd.kinetic import Granular
 from greybed.cfd.rims import Rims, Side
 from greybed.cfd.twofluid_mass import move_solids
+from greybed.cfd.twofluid_means import Means, averages
 from greybed.cfd.twofluid_momentum import move_momentum
 from greybed.cfd.twofluid_step import (
     Correction,
@@ -33,31 +33,6 @@ Array = NDArray[np.float64]
 # A step whose new velocities pass more than a cell in it is made again with half of it.
 _OUTRUN = 1.0
 _MOST_HALVINGS = 8
-
-
-@dataclass(frozen=True)
-class Means:
-    """Averages over the grid.
-
-    Attributes
-    ----------
-    solid_fraction : float
-    fraction_variance : float
-        Of the solid fraction over the cells [-].
-    solids_velocity, gas_velocity : three floats
-        Weighted with the volume of the phase [m s-1].
-    slip : three floats
-        Gas less solids of these [m s-1].
-    momentum : three floats
-        Of both phases over the volume of the grid [kg m-2 s-1].
-    """
-
-    solid_fraction: float
-    fraction_variance: float
-    solids_velocity: tuple[float, float, float]
-    gas_velocity: tuple[float, float, float]
-    slip: tuple[float, float, float]
-    momentum: tuple[float, float, float]
 
 
 class TwoFluid:
@@ -151,11 +126,9 @@ class TwoFluid:
         self._begin()
 
     def _blank(self) -> State:
-        rims = self._rims
-        return State(
-            rims.zeros(), *([rims.zeros() for _ in range(3)] for _ in range(3)),
-            rims.zeros(), rims.zeros(),
-        )  # fmt: skip
+        zeros = self._rims.zeros
+        us, ug, volume = ([zeros() for _ in range(3)] for _ in range(3))
+        return State(zeros(), us, ug, volume, zeros(), zeros())
 
     def _check_fraction(self, phi: Array) -> None:
         most = self.granular.packing
@@ -171,8 +144,8 @@ class TwoFluid:
         most = 0.25 * self._fluids.gas_density / (self._fluids.viscosity * wave)
         if self.time_step is not None and self.time_step > most:
             raise InputError(
-                f"two-fluid: time_step = {self.time_step:g} [s] is longer than the viscosity of the "
-                f"gas allows on this grid, {most:.3g} [s]; leave it out or take a shorter one."
+                f"two-fluid: time_step = {self.time_step:g} [s] is longer than the viscosity of "
+                f"the gas allows on this grid, {most:.3g} [s]; leave it out or take a shorter one."
             )
 
     def _balance(self, wanted: str | Sequence[float]) -> tuple[float, float, float]:
@@ -362,35 +335,7 @@ class TwoFluid:
     @property
     def means(self) -> Means:
         """Averages over the grid."""
-        f, state = self._fluids, self._state
-        phi = self._rims.inside(state.phi)
-        mean = float(phi.mean())
-        solids, gas = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
-        for a in self._rims.axes:
-            s, n = self._rims.strides[a], self.grid.cells[a]
-            face = np.empty(self._rims.size)
-            face[s:] = 0.5 * (state.phi[s:] + state.phi[:-s])
-            # Each face once; at sides that do not repeat half a cell belongs to it.
-            weight = np.ones(n + 1)
-            weight[0] = weight[-1] = 0.5
-            shape = [1, 1, 1]
-            shape[2 - a] = n + 1
-            share = weight.reshape(shape)
-            part = self._rims.inside(face, a)
-            for total, velocity, content in (
-                (solids, state.us[a], part), (gas, state.ug[a], 1.0 - part),
-            ):  # fmt: skip
-                total[a] = (
-                    float((share * content * self._rims.inside(velocity, a)).sum()) / phi.size
-                )
-        momentum = [f.density * s + f.gas_density * g for s, g in zip(solids, gas, strict=True)]
-        v = [s / mean if mean > 0.0 else 0.0 for s in solids]
-        u = [g / (1.0 - mean) for g in gas]
-        w = [g - s for g, s in zip(u, v, strict=True)]
-        return Means(
-            mean, float(phi.var()), (v[0], v[1], v[2]), (u[0], u[1], u[2]), (w[0], w[1], w[2]),
-            (momentum[0], momentum[1], momentum[2]),
-        )  # fmt: skip
+        return averages(self._rims, self._fluids, self._state)
 
     # -- restart --------------------------------------------------------------------------------
 

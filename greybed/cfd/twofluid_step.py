@@ -216,8 +216,8 @@ class Stepper:
             state.phi, square, dilation, gamma, f.density, f.diameter, *g.pressure_numbers,
             math.sin(math.radians(g.friction_angle)),
             -1.0 if g.temperature is None else g.temperature, g.drag_dissipation,
-            g.highest_temperature, self.size, self.array("theta"), self.array("shear"), self.array("second"),
-            self.array("friction"),
+            g.highest_temperature, self.size, self.array("theta"), self.array("shear"),
+            self.array("second"), self.array("friction"),
         )  # fmt: skip
         for name in ("theta", "shear", "second", "friction"):
             self.rims.cells(self.array(name))

@@ -17,6 +17,7 @@ def run_flow(options: argparse.Namespace, kind: str) -> int:
     """Run the case of the kind ``two-fluid`` or ``gas`` that ``options`` name; returns 0."""
     from greybed.core.files import output_folder, sha256_of, sole_writer, write_summary
     from greybed.core.progress import progress
+    from greybed.core.writers.history import write_history
     from greybed.coupling.flow_run import FlowRun
 
     case, flow, names = _made(options, kind)
@@ -48,7 +49,7 @@ def run_flow(options: argparse.Namespace, kind: str) -> int:
                         frames.write()
                     if due:
                         run.save(checkpoint, key)
-                        _write_history(folder / "history.csv", run.history)
+                        write_history(folder / "history.csv", run.history)
             except InputError as error:
                 said = str(error).removesuffix(".")
                 raise InputError(
@@ -56,7 +57,7 @@ def run_flow(options: argparse.Namespace, kind: str) -> int:
                 ) from None
         seconds, steps = time.perf_counter() - begin, flow.steps - at_start
         run.save(checkpoint, key)
-        _write_history(folder / "history.csv", run.history)
+        write_history(folder / "history.csv", run.history)
         cells = case.grid.grid.shape[0] * case.grid.grid.shape[1] * case.grid.grid.shape[2]
         results: dict[str, Any] = {
             "simulated_s": flow.time,
@@ -142,15 +143,6 @@ class _Frames:
             from greybed.report.particles import write_film
 
             write_film(self.folder.parent / "movie.gif", pictures, 6.0)
-
-
-def _write_history(path: Path, rows: list[dict[str, float]]) -> None:
-    from greybed.core.files import atomic_path
-
-    with atomic_path(path) as part, open(part, "w") as stream:
-        stream.write(",".join(rows[0]) + "\n")
-        for row in rows:
-            stream.write(",".join(f"{value:.9g}" for value in row.values()) + "\n")
 
 
 def _draw(folder: Path, run: Any, names: tuple[str, ...]) -> None:

@@ -16,7 +16,6 @@ from greybed.cli.simulate_particles import (
     Frames,
     files_of,
     say,
-    write_history,
     write_results,
 )
 
@@ -29,6 +28,7 @@ def run_liggghts(options: argparse.Namespace) -> int:
     from greybed.core.files import output_folder, sole_writer
     from greybed.core.progress import progress
     from greybed.core.readers import read_packing
+    from greybed.core.writers.history import write_history
     from greybed.dem.case import load_particle_case
     from greybed.dem.liggghts.deck import LOG
     from greybed.dem.liggghts.run import LiggghtsRun, loops
@@ -55,7 +55,7 @@ def run_liggghts(options: argparse.Namespace) -> int:
                     step = run.simulation.steps
                     if step == 0 or frames.due(step, done):
                         frames.write()
-                    write_history(folder / "history.csv", run)
+                    write_history(folder / "history.csv", run.tally.history)
         except InputError as error:
             raise InputError(f"{options.case}: {error}") from None
         seconds = time.perf_counter() - begin

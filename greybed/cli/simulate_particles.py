@@ -24,6 +24,7 @@ def run_particles(options: argparse.Namespace, *, gas: bool = False) -> int:
     from greybed.core.files import output_folder, sha256_of, sole_writer
     from greybed.core.progress import progress
     from greybed.core.readers import read_packing
+    from greybed.core.writers.history import write_history
     from greybed.dem.case import load_particle_case
     from greybed.dem.checkpoint import kept_with
     from greybed.dem.results import results_of
@@ -75,7 +76,7 @@ def run_particles(options: argparse.Namespace, *, gas: bool = False) -> int:
                         frames.write()
                     if step // apart > (step - done) // apart or step == run.steps:
                         run.save(checkpoint, key=key)
-                        write_history(folder / "history.csv", run)
+                        write_history(folder / "history.csv", run.tally.history)
                     advance(done)
             except KeyboardInterrupt:
                 if not run.simulation._pending:
@@ -121,8 +122,9 @@ def write_results(
     """Write history, end, collection of frames, pictures, film and summary of any engine."""
     from greybed.core.files import write_summary
     from greybed.core.writers import write_packing
+    from greybed.core.writers.history import write_history
 
-    write_history(folder / "history.csv", run)
+    write_history(folder / "history.csv", run.tally.history)
     final = frames.packing()
     write_packing(final, folder / "final.h5")
     write_packing(final, folder / "final.vtu", fields=frames.fields())
@@ -267,17 +269,6 @@ class Frames:
                     high.append(np.array(table.upper))
             self.stage = [np.min(low, axis=0), np.max(high, axis=0)]
         return self.stage
-
-
-def write_history(path: Path, run: Run) -> None:
-    """Write the samples as CSV."""
-    from greybed.core.files import atomic_path
-
-    rows = run.tally.history
-    with atomic_path(path) as part, open(part, "w") as stream:
-        stream.write(",".join(rows[0]) + "\n")
-        for row in rows:
-            stream.write(",".join(f"{value:.9g}" for value in row.values()) + "\n")
 
 
 def _draw(folder: Path, run: Run, frames: Frames) -> None:

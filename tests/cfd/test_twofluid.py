@@ -77,14 +77,14 @@ def test_a_violent_collapse_overfills_no_cell(granular, limited):
         drag=drag_law("stokes"),
     )  # fmt: skip
     mass, most, ever = sim.solids_mass, 0.0, 0
-    while sim.time < 4.5e-3:
+    while sim.time < 3.5e-3:
         sim.step()
         found = sim.solid_fraction
         assert found.min() >= 0.0
         assert found.max() <= granular.packing
         most, ever = max(most, found.max()), ever + sim.limited
     assert abs(sim.solids_mass / mass - 1.0) < 1e-13
-    assert most > 0.6
+    assert most > 0.55
     # Without any stress nothing but the limiter keeps cells from taking too much.
     assert (ever > 0) == limited
     lower, upper = sim.solid_fraction[0, :8].mean(), sim.solid_fraction[0, -4:].mean()
@@ -196,22 +196,17 @@ def test_a_correction_of_the_drag_acts_along_its_axis():
         one = np.ones_like(cell.solid_fraction)
         return one, 0.5 * one, one
 
-    grid = box(8, 8)
-    options = {
-        "drag": drag_law("stokes"),
-        "courant": 0.5,
-        "longest_step": 2e-3,
-        "gravity": (0, -0.981, 0),
-    }
-    plain = fluids(grid, 0.1, **options)
-    other = fluids(grid, 0.1, correction=half, **options)
+    # Cells and steps large beside the relaxation time of 26 ms: drag is implicit.
+    grid = Grid(cells=(4, 4, 1), upper=(0.04, 0.04, 0.01), periodic=(True, True, False))
+    plain = fluids(grid, 0.1, drag=drag_law("stokes"), longest_step=5e-3)
+    other = fluids(grid, 0.1, drag=drag_law("stokes"), longest_step=5e-3, correction=half)
     plain.run(0.4)
     other.run(0.8)
     assert other.means.slip[1] == pytest.approx(2.0 * plain.means.slip[1], rel=1e-6)
     assert seen[-1].slip[1] == pytest.approx(np.full(grid.shape, other.means.slip[1]))
     weight = 1500.0 * 0.1 + 1.2 * 0.9
-    assert seen[-1].pressure_gradient[1] == pytest.approx(np.full(grid.shape, -0.981 * weight))
-    assert seen[-1].size == pytest.approx(CELL)
+    assert seen[-1].pressure_gradient[1] == pytest.approx(np.full(grid.shape, -9.81 * weight))
+    assert seen[-1].size == pytest.approx(0.01)
 
 
 def test_a_step_that_fails_is_halved_and_then_stops_with_the_reason():
