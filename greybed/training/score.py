@@ -18,9 +18,18 @@ LEAST = 1e-4
 
 
 def r_squared(truth: Array, predicted: Array, weight: Array) -> float:
-    """Share of the weighted variance that is explained [-]."""
-    centred = truth - np.average(truth, weights=weight)
-    return 1.0 - float((weight * (truth - predicted) ** 2).sum() / (weight * centred**2).sum())
+    """Share of the weighted variance that is explained [-]; NaN where nothing varies."""
+    return 1.0 - _over_variance(np.square(truth - predicted), truth, weight)
+
+
+def _over_variance(square: Array, truth: Array, weight: Array) -> float:
+    """Weighted mean of squares over the variance of the truth [-]; NaN where it has none."""
+    mean = np.average(truth, weights=weight)
+    variance = float(np.average(np.square(truth - mean), weights=weight))
+    # Equal numbers differ from their mean by round-off, on some processors.
+    if variance <= (1e-12 * float(mean)) ** 2:
+        return float("nan")
+    return float(np.average(square, weights=weight)) / variance
 
 
 def score(
@@ -65,10 +74,7 @@ def score(
         "pairs": int(big.sum()),
         "packings": len(np.unique(packing)),
         "r2": r_squared(truth[big], predicted[big], w[big]),
-        "r2_noise": 1.0
-        - float(
-            np.average(c["stderr"][big] ** 2, weights=w[big]) / np.cov(truth[big], aweights=w[big])
-        ),
+        "r2_noise": 1.0 - _over_variance(np.square(c["stderr"][big]), truth[big], w[big]),
         "rmse": float(np.sqrt(np.average(error[big] ** 2, weights=w[big]))),
         "rmse_own": own_error(error[big], c["stderr"][big], w[big]),
         "noise": float(np.sqrt(np.average(c["stderr"][big] ** 2, weights=w[big]))),
