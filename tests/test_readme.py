@@ -59,7 +59,7 @@ def shell(code: str, folder: Path) -> subprocess.CompletedProcess[str]:
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     return subprocess.run(
         ["bash", "-euo", "pipefail", "-c", code],
-        cwd=folder, env={**os.environ, "PATH": path}, capture_output=True, text=True, timeout=120,
+        cwd=folder, env={**os.environ, "PATH": path}, capture_output=True, text=True, timeout=600,
     )  # fmt: skip
 
 

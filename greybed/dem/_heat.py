@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 
 from greybed.dem import _columns as col
-from greybed.dem._walls import nearest
+from greybed.dem._surfaces import nearest
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from greybed.core.errors import InputError
-from greybed.dem import _neighbours, _rigid, _step, _walls
+from greybed.dem import _neighbours, _rigid, _step, _surfaces, _walls
 from greybed.dem.bodies import chosen_bodies, joined_bodies, joined_states, sorted_bodies
 
 Array = NDArray[np.float64]
@@ -148,13 +148,13 @@ class Lists:
         for k in range(len(s.kinds)):
             m = s.motion[s.wall[k]]
             spin, axis = float(np.linalg.norm(m[3:6])), s.data[k, 3:6]
-            turned = s.kinds[k] != _walls.TRIANGLE and np.allclose(
+            turned = s.kinds[k] != _surfaces.TRIANGLE and np.allclose(
                 np.cross(axis, m[3:6]), 0.0, atol=1e-12 * max(spin, 1e-300)
             )
             away = m[6:9] - s.data[k, :3]
             if turned:  # about its own axis or normal: no nearer, if the axis goes through it
                 across = away - (away @ axis) * axis
-                turned = s.kinds[k] == _walls.PLANE or float(np.linalg.norm(across)) == 0.0
+                turned = s.kinds[k] == _surfaces.PLANE or float(np.linalg.norm(across)) == 0.0
             far = float(np.linalg.norm(s.data[k, 10:13] - m[6:9])) + min(s.data[k, 9], 1e300)
             if math.isinf(s.data[k, 9]):
                 place = self.state.place[:, :3] - m[6:9]

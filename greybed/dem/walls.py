@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from greybed.core.errors import InputError
 from greybed.core.walls import Cone, Cylinder, Disc, Mesh, Plane, Polygon, Wall
-from greybed.dem import _walls
+from greybed.dem import _surfaces
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -75,11 +75,11 @@ def _parts(shape: Wall) -> list[tuple[int, Array]]:
     if isinstance(shape, Plane):
         row[:3], row[3:6] = shape.point, shape.normal
         row[9], row[10:] = math.inf, shape.point
-        return [(_walls.PLANE, row)]
+        return [(_surfaces.PLANE, row)]
     if isinstance(shape, Disc):
         row[:3], row[3:6], row[6] = shape.point, shape.normal, shape.radius
         row[9], row[10:] = shape.radius, shape.point
-        return [(_walls.DISC, row)]
+        return [(_surfaces.DISC, row)]
     if isinstance(shape, Cylinder | Cone):
         end = shape.end_radius if isinstance(shape, Cone) else shape.radius
         length = math.inf if shape.length is None else shape.length
@@ -90,7 +90,7 @@ def _parts(shape: Wall) -> list[tuple[int, Array]]:
         else:
             row[9] = math.hypot(0.5 * length, max(shape.radius, end))
             row[10:] = np.asarray(shape.point) + 0.5 * length * np.asarray(shape.axis)
-        return [(_walls.TUBE if end == shape.radius else _walls.CONE, row)]
+        return [(_surfaces.TUBE if end == shape.radius else _surfaces.CONE, row)]
     if isinstance(shape, Polygon | Mesh):
         corners = shape.triangles
         parts = []
@@ -99,6 +99,6 @@ def _parts(shape: Wall) -> list[tuple[int, Array]]:
             row[:9] = triangle.ravel()
             row[10:] = triangle.mean(axis=0)
             row[9] = float(np.sqrt(((triangle - row[10:]) ** 2).sum(axis=1)).max())
-            parts.append((_walls.TRIANGLE, row))
+            parts.append((_surfaces.TRIANGLE, row))
         return parts
     raise InputError(f"wall {shape.name!r}: {type(shape).__name__} is no wall for particles.")
