@@ -21,7 +21,7 @@ from greybed.dem.simulation import Simulation
 
 Array = NDArray[np.float64]
 
-# What is added up over a run: momentum given by drag and by pressure [N s], and sums of steps.
+# What is added up over a run.
 _SUMS = ("gas steps", "pressure iterations", "lower limit of void fraction reached")
 
 
@@ -120,7 +120,10 @@ class GasParticlesRun(ParticleRun):
             left -= count
             self.last = report
             self.totals["gas steps"] += 1
+            self.totals["pressure iterations"] += self.coupled.gas_report.iterations
             self.totals["lower limit of void fraction reached"] += report.limited > 0
+            left_over = float(self.coupled.gas_report.divergence)
+            self.worst["divergence"] = max(self.worst["divergence"], left_over)
             self.worst["momentum"] = max(self.worst["momentum"], report.defect)
             if self.coupled.heat is not None and self.coupled.heat.report is not None:
                 self.worst["energy"] = max(self.worst["energy"], self.coupled.heat.report.defect)
@@ -180,6 +183,8 @@ class GasParticlesRun(ParticleRun):
                 "steps_with_void_fraction_limited": int(
                     self.totals["lower limit of void fraction reached"]
                 ),
+                "pressure_iterations": int(self.totals["pressure iterations"]),
+                "largest_divergence": self.worst["divergence"],
                 "largest_momentum_defect": self.worst["momentum"],
                 **(
                     {"largest_energy_defect": self.worst["energy"]}

@@ -108,6 +108,8 @@ def test_particles_in_a_gas_exchange_momentum_whole_and_go_on_bit_by_bit(tmp_pat
     assert whole.worst["momentum"] < 1e-12
     assert whole.totals["gas steps"] > 10
     result = whole.gas_results()["gas"]
+    assert result["pressure_iterations"] > 0
+    assert 0.0 < result["largest_divergence"] <= case.tolerance
     # The gas carries what the bed weighs at most, and some of it.
     weight = float(whole.simulation.masses.sum()) * 9.81 / 1e-4
     assert 0.1 * weight < result["pressure drop along z [Pa]"] < 3.0 * weight
