@@ -19,6 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from greybed._version import __version__
+from greybed.closures.drag.filtered import limits as drag_limits
+from greybed.closures.drag.filtered.closure import QUANTITY, FilteredDragClosure
+from greybed.closures.drag.filtered.features import MARKER_SETS as DRAG_MARKER_SETS
+from greybed.closures.drag.filtered.gate import Gate
 from greybed.closures.predictors import PREDICTORS
 from greybed.closures.viewfactor.closure import Domain, ViewFactorClosure
 from greybed.closures.viewfactor.limits import random_markers
@@ -32,30 +36,55 @@ GOLDEN_ROWS = 64
 GOLDEN_TOLERANCE = 1e-12
 SUFFIX = ".closure"
 
+Closure = ViewFactorClosure | FilteredDragClosure
 
-def golden_rows(closure: ViewFactorClosure) -> tuple[NDArray, NDArray]:
-    """Inputs (64, n_markers) and outputs (64, 2: factor, standard error) to replay anywhere."""
+
+def golden_rows(closure: Closure) -> tuple[NDArray, NDArray]:
+    """Inputs (64, n_markers) and outputs (64, n) to replay anywhere.
+
+    Outputs are factor and standard error, or kept fractions along and across gravity, share of
+    the gradient's force and standard error.
+    """
+    if isinstance(closure, FilteredDragClosure):
+        markers = drag_limits.random_markers(closure, GOLDEN_ROWS, seed=20, beyond=0.2)
+        # Each limit of the gate is replayed too.
+        markers["solid_fraction"][::16] = 0.0
+        markers["solid_fraction"][1::16] = closure.gate.packing
+        markers["filter_size"][2::16] = 0.0
+    else:
+        markers = _pair_rows(closure)
+    inputs = np.stack([markers[name] for name in closure.marker_names], axis=1)
+    return inputs, answers(closure, inputs)
+
+
+def answers(closure: Closure, inputs: NDArray) -> NDArray:
+    """What a closure says of rows of markers, as golden rows have it."""
+    columns = dict(zip(closure.marker_names, inputs.T, strict=True))
+    if isinstance(closure, FilteredDragClosure):
+        return np.stack(closure.predict(**columns)[:4], axis=1)
+    return np.stack(closure.predict(**columns)[:2], axis=1)
+
+
+def _pair_rows(closure: ViewFactorClosure) -> dict[str, NDArray]:
     markers = random_markers(closure, GOLDEN_ROWS, seed=20)
     # Every third row free of obstruction, so that the gate's exact zero is replayed too.
     for marker in closure.markers.markers:
         if marker.free is not None:
             markers[marker.name][::3] = marker.free
-    prediction = closure.predict(**markers)
-    inputs = np.stack([markers[name] for name in closure.marker_names], axis=1)
-    return inputs, np.stack([prediction.view_factor, prediction.stderr], axis=1)
+    return markers
 
 
-def content_hash(closure: ViewFactorClosure) -> str:
+def content_hash(closure: Closure) -> str:
     """SHA-256 over the arrays that decide what a closure answers: the same in every export."""
     digest = hashlib.sha256(f"{closure.quantity} {closure.markers.name} {closure.kind}".encode())
-    arrays = {**closure.predictor.arrays(), **closure.domain.arrays()}
+    arrays = {**closure.predictor.arrays(), **closure.arrays()}
     for name, array in sorted(arrays.items()):
         digest.update(name.encode())
         digest.update(np.ascontiguousarray(array).tobytes())
     return digest.hexdigest()
 
 
-def save(closure: ViewFactorClosure, path: str | os.PathLike[str]) -> Path:
+def save(closure: Closure, path: str | os.PathLike[str]) -> Path:
     """Write a closure to one file, whole or not at all.
 
     Raises
@@ -77,7 +106,7 @@ def save(closure: ViewFactorClosure, path: str | os.PathLike[str]) -> Path:
     }
     arrays = {
         **{f"predictor_{k}": v for k, v in closure.predictor.arrays().items()},
-        **closure.domain.arrays(),
+        **closure.arrays(),
         "golden_inputs": inputs,
         "golden_outputs": outputs,
         "manifest": np.frombuffer(json.dumps(manifest).encode(), dtype=np.uint8),
@@ -94,7 +123,7 @@ def save(closure: ViewFactorClosure, path: str | os.PathLike[str]) -> Path:
 
 
 def load(path: str | os.PathLike[str]) -> ViewFactorClosure:
-    """Read a closure and replay its golden rows.
+    """Read a closure of view, wall or exchange factors and replay its golden rows.
 
     Parameters
     ----------
@@ -109,35 +138,64 @@ def load(path: str | os.PathLike[str]) -> ViewFactorClosure:
     Raises
     ------
     InputError
-        If the file is missing, not an artifact, truncated or changed.
+        If the file is missing, not an artifact, truncated, changed, or of filtered drag.
     VerificationError
         If a golden row does not come out as it was stored.
     """
+    closure = load_any(path)
+    if isinstance(closure, FilteredDragClosure):
+        raise InputError(
+            f"{path}: this closure gives filtered drag, not view factors; read it with load_drag."
+        )
+    return closure
+
+
+def load_drag(path: str | os.PathLike[str]) -> FilteredDragClosure:
+    """Read a closure of filtered drag and replay its golden rows; see :func:`load`."""
+    closure = load_any(path)
+    if not isinstance(closure, FilteredDragClosure):
+        raise InputError(
+            f"{path}: this closure gives {closure.quantity}s, not filtered drag; read it with load."
+        )
+    return closure
+
+
+def load_any(path: str | os.PathLike[str]) -> Closure:
+    """Read a closure of any kind and replay its golden rows; see :func:`load`."""
     file = Path(path)
     arrays, manifest = _unpack(file)
     try:
         predictor = PREDICTORS[manifest["kind"]].from_arrays(
             {k.removeprefix("predictor_"): v for k, v in arrays.items() if k[:10] == "predictor_"}
         )
-        closure = ViewFactorClosure(
-            MARKER_SETS[manifest["markers"]], predictor, Domain.from_arrays(arrays),
-            manifest["card"],
-        )  # fmt: skip
+        domain, card = Domain.from_arrays(arrays), manifest["card"]
+        closure: Closure
+        if manifest["quantity"] == QUANTITY:
+            closure = FilteredDragClosure(
+                DRAG_MARKER_SETS[manifest["markers"]], predictor, domain,
+                Gate.from_arrays(arrays), card,
+            )  # fmt: skip
+        else:
+            closure = ViewFactorClosure(MARKER_SETS[manifest["markers"]], predictor, domain, card)
         inputs, expected = arrays["golden_inputs"], arrays["golden_outputs"]
+        # An artifact that is not of one piece must not get further than here.
+        fits = inputs.shape[1] == len(closure.marker_names) and len(inputs) == len(expected)
+        replayed = answers(closure, inputs)
+        if not fits or replayed.shape != expected.shape:
+            raise ValueError("golden rows of another shape")
     except (KeyError, IndexError, ValueError) as error:
         raise InputError(
             f"{file}: the artifact lacks or mistakes {error}; it was written by greybed "
             f"{manifest.get('greybed', 'unknown')}, this is {__version__}: train it again."
         ) from None
-    columns = dict(zip(closure.marker_names, inputs.T, strict=True))
-    prediction = closure.predict(**columns)
-    replayed = np.stack([prediction.view_factor, prediction.stderr], axis=1)
     error_ = np.abs(replayed - expected) / np.maximum(np.abs(expected), 1e-300)
     if not (error_ <= GOLDEN_TOLERANCE).all():
-        row = int(np.nan_to_num(error_, nan=np.inf).max(axis=1).argmax())
+        wrong = np.nan_to_num(error_, nan=np.inf)
+        row = int(wrong.max(axis=1).argmax())
+        column = int(wrong[row].argmax())
         raise VerificationError(
-            f"{file}: golden row {row} gives {replayed[row, 0]:.17g} instead of "
-            f"{expected[row, 0]:.17g} [-], beyond {GOLDEN_TOLERANCE:g}; this installation "
+            f"{file}: golden row {row} gives {replayed[row, column]:.17g} instead of "
+            f"{expected[row, column]:.17g} [-], beyond {GOLDEN_TOLERANCE:g}; this installation "
             "computes differently: reinstall numpy, or train the closure again."
         )
     return closure

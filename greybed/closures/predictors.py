@@ -1,4 +1,7 @@
-"""Two-headed predictors without torch or scikit-learn: a small network, a forest in arrays."""
+"""Predictors without torch or scikit-learn: a small network, a forest in arrays.
+
+Their last output is a spread; the ones before it are values, one or more.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ BLOCK = 256
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """Fully connected network with tanh between the layers and two outputs (value, spread).
+    """Fully connected network with tanh between the layers; outputs are values, then a spread.
 
     Attributes
     ----------
@@ -40,7 +43,7 @@ class Network:
     biases: tuple[Array, ...]
 
     def __call__(self, features: Array) -> Array:
-        """Outputs (m, 2) of features (m, n_features)."""
+        """Outputs (m, n_outputs) of features (m, n_features)."""
         out = np.empty((len(features), self.biases[-1].size))
         for first in range(0, len(features), BLOCK):
             some = slice(first, first + BLOCK)
@@ -54,6 +57,24 @@ class Network:
             if k + 1 < len(self.weights):
                 x = np.tanh(x)
         return x
+
+    def with_slopes(self, features: Array) -> tuple[Array, Array]:
+        """Outputs (m, n_outputs) and derivatives of the values (m, n_outputs - 1, n_features)."""
+        values = self.biases[-1].size - 1
+        out = np.empty((len(features), values + 1))
+        slopes = np.empty((len(features), values, features.shape[1]))
+        for first in range(0, len(features), BLOCK):
+            some = slice(first, first + BLOCK)
+            layers = [(features[some] - self.mean) / self.scale]
+            for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
+                layers.append(np.tanh(layers[-1] @ weight + bias))
+            out[some] = layers[-1] @ self.weights[-1] + self.biases[-1]
+            for k in range(values):
+                back = np.broadcast_to(self.weights[-1][:, k], layers[-1].shape)
+                for x, weight in zip(layers[:0:-1], self.weights[-2::-1], strict=True):
+                    back = (back * (1.0 - x * x)) @ weight.T
+                slopes[some, k] = back / self.scale
+        return out, slopes
 
     def arrays(self) -> dict[str, NDArray]:
         """Arrays to store, by name."""
@@ -77,10 +98,12 @@ class Network:
         )
 
     @classmethod
-    def random(cls, n_features: int, hidden: tuple[int, ...] = (24, 24), seed: int = 0) -> Network:
+    def random(
+        cls, n_features: int, hidden: tuple[int, ...] = (24, 24), seed: int = 0, outputs: int = 2
+    ) -> Network:
         """Untrained network with Glorot weights."""
         rng = np.random.default_rng(seed)
-        sizes = (n_features, *hidden, 2)
+        sizes = (n_features, *hidden, outputs)
         weights, biases = [], []
         for n_in, n_out in pairwise(sizes):
             limit = np.sqrt(6.0 / (n_in + n_out))
@@ -103,8 +126,8 @@ class Forest:
         Left where the feature is at most this.
     left : (n_nodes,) int32
         Left child; the right one follows it.
-    value : (n_nodes, 2) float64
-        Leaf values (value, spread).
+    value : (n_nodes, n_outputs) float64
+        Leaf values, the spread last.
     """
 
     kind: ClassVar[str] = "forest"
@@ -120,7 +143,8 @@ class Forest:
         # A file must not be able to send the walk out of bounds or round in circles.
         sound = (
             len(self.threshold) == len(self.left) == len(self.value) == nodes
-            and self.value.shape[1:] == (2,)
+            and self.value.ndim == 2
+            and self.value.shape[1] >= 2
             and len(self.roots) > 0
             and ((self.roots >= 0) & (self.roots < nodes)).all()
             and (self.left[inner] > np.flatnonzero(inner)).all()
@@ -130,8 +154,8 @@ class Forest:
             raise InputError("the forest's arrays do not form trees; train or copy it again.")
 
     def __call__(self, features: Array) -> Array:
-        """Outputs (m, 2) of features (m, n_features)."""
-        out = np.empty((len(features), 2))
+        """Outputs (m, n_outputs) of features (m, n_features)."""
+        out = np.empty((len(features), self.value.shape[1]))
         single = np.ascontiguousarray(features, dtype=np.float32)
         _kernels.walk_trees(
             single, self.roots, self.feature, self.threshold, self.left, self.value, out
@@ -155,7 +179,7 @@ class Forest:
         return cls(*(arrays[name] for name in names))
 
     @classmethod
-    def random(cls, n_features: int, trees: int = 8, seed: int = 0) -> Forest:
+    def random(cls, n_features: int, trees: int = 8, seed: int = 0, outputs: int = 2) -> Forest:
         """Untrained forest: trees of depth three with random splits and leaves in (0, 1)."""
         rng = np.random.default_rng(seed)
         nodes = 15
@@ -167,7 +191,7 @@ class Forest:
             feature.ravel().astype(np.int32),
             rng.uniform(0.0, 1.0, trees * nodes).astype(np.float32),
             left.ravel().astype(np.int32),
-            rng.uniform(0.01, 0.99, (trees * nodes, 2)),
+            rng.uniform(0.01, 0.99, (trees * nodes, outputs)),
         )
 
 

@@ -6,7 +6,8 @@ import os
 from importlib.resources import files
 from pathlib import Path
 
-from greybed.closures.artifact import SUFFIX, load
+from greybed.closures.artifact import SUFFIX, load, load_drag
+from greybed.closures.drag.filtered.closure import FilteredDragClosure
 from greybed.closures.viewfactor.closure import ViewFactorClosure
 from greybed.core import InputError
 
@@ -78,3 +79,8 @@ def shipped(name: str = "viewfactor_mlp_pencil") -> ViewFactorClosure:
     0.075587
     """
     return load(model_path(PREFIX + name))
+
+
+def shipped_drag(name: str = "filtered_drag_mlp_plain") -> FilteredDragClosure:
+    """Load a closure of filtered drag that comes with greybed, as :func:`shipped` does."""
+    return load_drag(model_path(PREFIX + name))

@@ -163,6 +163,10 @@ class ViewFactorClosure:
         """Names of the markers that :meth:`evaluate` takes."""
         return self.markers.names
 
+    def arrays(self) -> dict[str, NDArray]:
+        """Arrays besides those of the predictor that a file holds."""
+        return self.domain.arrays()
+
     def evaluate(self, **markers: ArrayLike) -> Array:
         """View factors from i to j.
 
