@@ -26,6 +26,8 @@ BLOCK = 256
 class Network:
     """Fully connected network with tanh between the layers; outputs are values, then a spread.
 
+    A ``bent`` one has x / sqrt(1 + x^2) instead, which takes a quarter of the time of tanh.
+
     Attributes
     ----------
     mean, scale : (n_features,) float
@@ -41,6 +43,7 @@ class Network:
     scale: Array
     weights: tuple[Array, ...]
     biases: tuple[Array, ...]
+    bent: bool = False
 
     def __call__(self, features: Array) -> Array:
         """Outputs (m, n_outputs) of features (m, n_features)."""
@@ -55,8 +58,16 @@ class Network:
         for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             x = x @ weight + bias
             if k + 1 < len(self.weights):
-                x = np.tanh(x)
+                x = self._squashed(x)[0]
         return x
+
+    def _squashed(self, x: Array) -> tuple[Array, Array]:
+        """What a layer makes of its sums, and the slope of it."""
+        if self.bent:
+            inverse = 1.0 / np.sqrt(1.0 + x * x)
+            return x * inverse, inverse * inverse * inverse
+        y = np.tanh(x)
+        return y, 1.0 - y * y
 
     def with_slopes(self, features: Array) -> tuple[Array, Array]:
         """Outputs (m, n_outputs) and derivatives of the values (m, n_outputs - 1, n_features)."""
@@ -65,14 +76,16 @@ class Network:
         slopes = np.empty((len(features), values, features.shape[1]))
         for first in range(0, len(features), BLOCK):
             some = slice(first, first + BLOCK)
-            layers = [(features[some] - self.mean) / self.scale]
+            x = (features[some] - self.mean) / self.scale
+            steep = []
             for weight, bias in zip(self.weights[:-1], self.biases[:-1], strict=True):
-                layers.append(np.tanh(layers[-1] @ weight + bias))
-            out[some] = layers[-1] @ self.weights[-1] + self.biases[-1]
+                x, slope = self._squashed(x @ weight + bias)
+                steep.append(slope)
+            out[some] = x @ self.weights[-1] + self.biases[-1]
             for k in range(values):
-                back = np.broadcast_to(self.weights[-1][:, k], layers[-1].shape)
-                for x, weight in zip(layers[:0:-1], self.weights[-2::-1], strict=True):
-                    back = (back * (1.0 - x * x)) @ weight.T
+                back = np.broadcast_to(self.weights[-1][:, k], x.shape)
+                for slope, weight in zip(steep[::-1], self.weights[-2::-1], strict=True):
+                    back = (back * slope) @ weight.T
                 slopes[some, k] = back / self.scale
         return out, slopes
 
@@ -84,6 +97,7 @@ class Network:
             "scale": self.scale,
             **layers,
             **{f"bias_{k}": b for k, b in enumerate(self.biases)},
+            **({"bent": np.array([1], np.int64)} if self.bent else {}),
         }
 
     @classmethod
@@ -95,12 +109,14 @@ class Network:
             arrays["scale"],
             tuple(arrays[f"weight_{k}"] for k in range(n)),
             tuple(arrays[f"bias_{k}"] for k in range(n)),
+            "bent" in arrays,
         )
 
     @classmethod
     def random(
-        cls, n_features: int, hidden: tuple[int, ...] = (24, 24), seed: int = 0, outputs: int = 2
-    ) -> Network:
+        cls, n_features: int, hidden: tuple[int, ...] = (24, 24), seed: int = 0, outputs: int = 2,
+        bent: bool = False,
+    ) -> Network:  # fmt: skip
         """Untrained network with Glorot weights."""
         rng = np.random.default_rng(seed)
         sizes = (n_features, *hidden, outputs)
@@ -109,7 +125,8 @@ class Network:
             limit = np.sqrt(6.0 / (n_in + n_out))
             weights.append(rng.uniform(-limit, limit, (n_in, n_out)))
             biases.append(np.zeros(n_out))
-        return cls(np.zeros(n_features), np.ones(n_features), tuple(weights), tuple(biases))
+        zero, one = np.zeros(n_features), np.ones(n_features)
+        return cls(zero, one, tuple(weights), tuple(biases), bent)
 
 
 @dataclass(frozen=True, eq=False)

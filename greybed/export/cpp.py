@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import textwrap
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -12,10 +11,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from greybed.closures import ViewFactorClosure, golden_rows
-from greybed.closures.predictors import Forest, Network
+from greybed.closures.predictors import Network
 from greybed.closures.viewfactor.visibility import ODDS_BOUND, SPREAD_BOUND
 from greybed.core import InputError
 from greybed.core.exact import TOUCHING, quadrature
@@ -28,10 +26,10 @@ from greybed.export.metadata import (
     describe,
     export_name,
 )
+from greybed.export.tables import LARGEST, checksum, doubles, finite, forest_tables, network_tables
 
 # Relative difference that a golden row may show on another machine or with -ffast-math.
 TOLERANCE = 1e-12
-_LARGEST = float(np.finfo(np.float64).max)
 
 CMAKE = """\
 cmake_minimum_required(VERSION 3.10)
@@ -134,89 +132,6 @@ FORMULAE = {
 }
 
 
-@dataclass(frozen=True)
-class Table:
-    """A constant array of the header."""
-
-    name: str
-    ctype: str
-    values: NDArray
-
-    @property
-    def size(self) -> int:
-        """Number of entries."""
-        return self.values.size
-
-    @property
-    def text(self) -> str:
-        """The entries, several a line."""
-        # tolist() and repr give the fewest digits that read back as the same bits.
-        if self.ctype == "float":
-            words = [f"{word}f" for word in map(str, self.values.ravel())]
-        else:
-            words = [repr(value) for value in self.values.ravel().tolist()]
-        step = 16 if self.ctype.startswith("std::int") else 4
-        rows = (", ".join(words[k : k + step]) for k in range(0, len(words), step))
-        return ",\n      ".join(rows)
-
-    @property
-    def bits(self) -> list[int]:
-        """Each entry as an unsigned 64-bit number, for the checksum."""
-        flat = np.ascontiguousarray(self.values).ravel()
-        if self.ctype == "double":
-            return flat.view(np.uint64).tolist()
-        if self.ctype == "float":
-            return flat.view(np.uint32).tolist()
-        return flat.astype(np.int64).view(np.uint64).tolist()
-
-
-def checksum(tables: Iterable[Table]) -> int:
-    """FNV-1a over 64-bit words; every step is invertible, so no single change goes unseen."""
-    value = 0xCBF29CE484222325
-    for table in tables:
-        for word in table.bits:
-            value = ((value ^ word) * 0x100000001B3) & 0xFFFFFFFFFFFFFFFF
-    return value
-
-
-def _doubles(name: str, values: Any) -> Table:
-    # Adding zero turns -0.0 into 0.0, whose literal survives every compiler flag.
-    array = np.asarray(values, dtype=np.float64) + 0.0
-    if not np.isfinite(array).all():
-        raise InputError(f"{name} of the closure is not finite; train it again.")
-    return Table(name, "double", array)
-
-
-def _network_tables(network: Network) -> list[Table]:
-    tables = [_doubles("mean", network.mean), _doubles("scale", network.scale)]
-    for k, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
-        tables += [_doubles(f"weight_{k}", weight), _doubles(f"bias_{k}", bias)]
-    return tables
-
-
-def _forest_tables(forest: Forest) -> list[Table]:
-    leaf = forest.feature < 0
-    # A leaf needs no child, so its place holds the row of its values: half as many of them.
-    following = np.where(leaf, np.cumsum(leaf) - 1, forest.left)
-    threshold = np.where(leaf, np.float32(0), forest.threshold + np.float32(0))
-    if not np.isfinite(threshold).all():
-        raise InputError("a threshold of the closure is not finite; train it again.")
-    if forest.feature.max(initial=0) > 127:
-        raise InputError("the closure has more than 128 features; the header holds no more.")
-    return [
-        Table("roots", "std::int32_t", forest.roots),
-        Table("feature", "std::int8_t", forest.feature),
-        Table("threshold", "float", threshold.astype(np.float32)),
-        Table("following", "std::int32_t", following.astype(np.int32)),
-        _doubles("leaf_values", forest.value[leaf]),
-    ]
-
-
-def _finite(values: Any) -> NDArray:
-    """Infinite bounds as the largest numbers: -ffast-math knows no infinity."""
-    return np.clip(np.asarray(values, dtype=np.float64), -_LARGEST, _LARGEST)
-
-
 def _context(closure: ViewFactorClosure, name: str) -> dict[str, Any]:
     if closure.markers.name not in FORMULAE:
         raise InputError(
@@ -226,28 +141,28 @@ def _context(closure: ViewFactorClosure, name: str) -> dict[str, Any]:
     formulae = FORMULAE[closure.markers.name]
     predictor, domain = closure.predictor, closure.domain
     with np.errstate(over="ignore"):
-        limit2 = float(_finite(np.float64(domain.limit) ** 2))
+        limit2 = float(finite(np.float64(domain.limit) ** 2))
     of_pairs = closure.quantity != "wallfactor"
     nodes = zip(("node_square", "node_weight"), quadrature(), strict=True)
     tables = [
-        *(_doubles(*node) for node in nodes if of_pairs),
-        _doubles("domain_low", _finite(domain.low)),
-        _doubles("domain_high", _finite(domain.high)),
-        _doubles("domain_centre", domain.centre),
-        _doubles("domain_precision", domain.precision),
+        *(doubles(*node) for node in nodes if of_pairs),
+        doubles("domain_low", finite(domain.low)),
+        doubles("domain_high", finite(domain.high)),
+        doubles("domain_centre", domain.centre),
+        doubles("domain_precision", domain.precision),
     ]
     context: dict[str, Any] = {}
     if isinstance(predictor, Network):
-        tables += _network_tables(predictor)
+        tables += network_tables(predictor)
         sizes = [len(predictor.mean), *(len(bias) for bias in predictor.biases)]
         context["layers"] = list(pairwise(sizes))
     else:
-        tables += _forest_tables(predictor)
+        tables += forest_tables(predictor)
     inputs, outputs = golden_rows(closure)
     golden = [
-        *(_doubles(f"golden_{n}", c) for n, c in zip(closure.marker_names, inputs.T, strict=True)),
-        _doubles("golden_factor", outputs[:, 0]),
-        _doubles("golden_stderr", outputs[:, 1]),
+        *(doubles(f"golden_{n}", c) for n, c in zip(closure.marker_names, inputs.T, strict=True)),
+        doubles("golden_factor", outputs[:, 0]),
+        doubles("golden_stderr", outputs[:, 1]),
     ]
     return {
         **context,
@@ -255,11 +170,12 @@ def _context(closure: ViewFactorClosure, name: str) -> dict[str, Any]:
         "name": name,
         "guard": f"GREYBED_{name.upper()}_HPP",
         "kind": closure.kind,
+        "outputs": 2,
         "quantity": QUANTITIES[closure.quantity],
         "of_pairs": of_pairs,
         "markers": closure.markers.markers,
         "allowed": allowed,
-        "largest": repr(_LARGEST),
+        "largest": repr(LARGEST),
         "reach": repr(1.0 / (1.0 - TOUCHING)),
         "features": list(zip(closure.markers.feature_names, formulae.features, strict=True)),
         "formulae": formulae,
@@ -277,7 +193,8 @@ def _context(closure: ViewFactorClosure, name: str) -> dict[str, Any]:
 
 
 @cache
-def _environment() -> Any:
+def environment() -> Any:
+    """Templates of the exported files."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -361,9 +278,9 @@ def export_cpp(
     context = _context(closure, word)
     target = output_folder(folder)
     files = {
-        f"{word}.hpp": _environment().get_template("closure.hpp").render(context),
-        f"{word}_test.cpp": _environment().get_template("closure_test.cpp").render(context),
-        "README.md": _environment().get_template("README.md").render(context),
+        f"{word}.hpp": environment().get_template("closure.hpp").render(context),
+        f"{word}_test.cpp": environment().get_template("closure_test.cpp").render(context),
+        "README.md": environment().get_template("README.md").render(context),
         "CMakeLists.txt": CMAKE.format(name=word),
     }
     for file, text in files.items():

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from math import isinf
 
 from greybed._version import __version__
-from greybed.closures import ViewFactorClosure, content_hash
+from greybed.closures import content_hash
+from greybed.closures.artifact import Closure
 from greybed.closures.viewfactor.visibility import Marker
 from greybed.core import InputError
 
@@ -62,6 +63,17 @@ QUANTITIES = {
             "unobstructed factor; K is what j absorbs of reflected light; v is learnt.",
         ),
     ),
+    "filtereddrag": Quantity(
+        "fraction of drag that is kept on a coarse grid",
+        "kept_along",
+        (
+            "F = (1 - share) beta [H_along g g + H_across (I - g g)] slip + share P,",
+            "ln H = gate bounded(model),   P = -eps (grad p - rho_g g)",
+            "beta is that of the drag law at the filtered fields; H is the fraction that is kept;",
+            "the gate is exactly 0, so H = 1, for no particles, packed particles and filters of",
+            "size 0; the share is 0 but for closures with a linear part.",
+        ),
+    ),
 }
 
 # Words of C++20 that would break the namespace of a header; identifiers with __ are refused too.
@@ -76,7 +88,7 @@ _RESERVED = """
     xor xor_eq std greybed"""
 
 
-def export_name(closure: ViewFactorClosure, name: str | None = None) -> str:
+def export_name(closure: Closure, name: str | None = None) -> str:
     """Name of an export: ``name`` if it is an identifier, else one made from the closure.
 
     Raises
@@ -101,12 +113,12 @@ def allowed(marker: Marker) -> str:
     return f"{opening}{marker.low:g}, {marker.high:g}{')' if isinf(marker.high) else ']'}"
 
 
-def dataset_hash(closure: ViewFactorClosure) -> str:
+def dataset_hash(closure: Closure) -> str:
     """SHA-256 of the training data set as the card has it, or an empty string."""
     return str(closure.card.get("data_sha256", ""))
 
 
-def describe(closure: ViewFactorClosure, name: str) -> dict[str, str]:
+def describe(closure: Closure, name: str) -> dict[str, str]:
     """Plain strings that travel with every exported form."""
     return {
         "name": name,

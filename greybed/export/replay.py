@@ -14,7 +14,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from greybed.closures import ViewFactorClosure, content_hash, golden_rows
+from greybed.closures import content_hash, golden_rows
+from greybed.closures.artifact import Closure
 from greybed.closures.viewfactor import Prediction
 from greybed.core import InputError, RangeError, VerificationError
 from greybed.core.files import output_folder
@@ -32,8 +33,8 @@ class Exported(Protocol):
     hash: str
     marker_names: tuple[str, ...]
 
-    def predict(self, **markers: ArrayLike) -> Prediction:
-        """Factor, standard error and extrapolation of each pair."""
+    def predict(self, **markers: ArrayLike) -> Any:
+        """What the closure's own ``predict`` gives."""
         ...
 
 
@@ -105,10 +106,8 @@ def _flat(
     return [np.ascontiguousarray(a).ravel() for a in arrays], arrays[0].shape
 
 
-class CompiledClosure:
-    """A closure exported to C++, answering through its compiled test program.
-
-    Unlike in Python, markers out of range give NaN instead of an error.
+class CompiledProgram:
+    """The compiled test program of an exported closure.
 
     Parameters
     ----------
@@ -139,12 +138,8 @@ class CompiledClosure:
                 f"{done.returncode}); export and compile it again."
             ) from None
 
-    def evaluate(self, **markers: ArrayLike) -> Array:
-        """View, wall or exchange factors [-] of markers by name."""
-        return self.predict(**markers).view_factor
-
-    def predict(self, **markers: ArrayLike) -> Prediction:
-        """Factor, standard error and extrapolation; all pairs in one call of the program."""
+    def rows(self, markers: Mapping[str, ArrayLike], width: int) -> tuple[Array, tuple[int, ...]]:
+        """Answers (n, width) to markers, and the shape that these had; one call of the program."""
         columns, shape = _flat(self.marker_names, markers)
         form = ",".join(["%.17g"] * len(columns))
         rows = (form % row for row in zip(*(c.tolist() for c in columns), strict=True))
@@ -156,9 +151,25 @@ class CompiledClosure:
                 "export and compile it again."
             )
         # A header line alone is a legal answer to no rows.
-        table = np.empty((0, 3))
+        table = np.empty((0, width))
         if columns[0].size:
             table = np.loadtxt(io.StringIO(done.stdout), delimiter=",", skiprows=1, ndmin=2)
+        return table, shape
+
+
+class CompiledClosure(CompiledProgram):
+    """A closure exported to C++, answering through its compiled test program.
+
+    Unlike in Python, markers out of range give NaN instead of an error.
+    """
+
+    def evaluate(self, **markers: ArrayLike) -> Array:
+        """View, wall or exchange factors [-] of markers by name."""
+        return self.predict(**markers).view_factor
+
+    def predict(self, **markers: ArrayLike) -> Prediction:
+        """Factor, standard error and extrapolation; all pairs in one call of the program."""
+        table, shape = self.rows(markers, 3)
         return Prediction(
             table[:, 0].reshape(shape),
             table[:, 1].reshape(shape),
@@ -166,10 +177,8 @@ class CompiledClosure:
         )
 
 
-class OnnxClosure:
-    """A closure exported to ONNX, answering through onnxruntime on one thread.
-
-    Unlike in Python, markers out of range give NaN instead of an error.
+class OnnxGraph:
+    """A graph of an exported closure in onnxruntime, on one thread.
 
     Parameters
     ----------
@@ -202,16 +211,26 @@ class OnnxClosure:
         self.marker_names = tuple(value.name for value in self._session.get_inputs())
         self._outputs = [value.name for value in self._session.get_outputs()]
 
+    def run(self, markers: Mapping[str, ArrayLike]) -> list[Any]:
+        """Outputs of the graph, in their order and in the shape of the markers."""
+        columns, shape = _flat(self.marker_names, markers)
+        feed = dict(zip(self.marker_names, columns, strict=True))
+        return [np.reshape(result, shape) for result in self._session.run(self._outputs, feed)]
+
+
+class OnnxClosure(OnnxGraph):
+    """A closure exported to ONNX, answering through onnxruntime on one thread.
+
+    Unlike in Python, markers out of range give NaN instead of an error.
+    """
+
     def evaluate(self, **markers: ArrayLike) -> Array:
         """View, wall or exchange factors [-] of markers by name."""
         return self.predict(**markers).view_factor
 
     def predict(self, **markers: ArrayLike) -> Prediction:
         """Factor, standard error and extrapolation."""
-        columns, shape = _flat(self.marker_names, markers)
-        feed = dict(zip(self.marker_names, columns, strict=True))
-        results = self._session.run(self._outputs, feed)
-        return Prediction(*(np.reshape(result, shape) for result in results))
+        return Prediction(*self.run(markers))
 
 
 def relative_error(value: Array, expected: Array) -> Array:
@@ -220,14 +239,14 @@ def relative_error(value: Array, expected: Array) -> Array:
     return np.nan_to_num(np.abs(value - expected) / size, nan=np.inf, posinf=np.inf)
 
 
-def replay(closure: ViewFactorClosure, exported: Exported, tolerance: float) -> dict[str, Any]:
+def replay(closure: Closure, exported: Exported, tolerance: float) -> dict[str, Any]:
     """Replay the golden rows through an exported form.
 
     Parameters
     ----------
-    closure : ViewFactorClosure
+    closure : ViewFactorClosure or FilteredDragClosure
         What was exported.
-    exported : CompiledClosure or OnnxClosure
+    exported : Exported
         The exported form.
     tolerance : float
         Relative difference that a row may show [-].
@@ -240,7 +259,8 @@ def replay(closure: ViewFactorClosure, exported: Exported, tolerance: float) -> 
     """
     inputs, expected = golden_rows(closure)
     answer = exported.predict(**dict(zip(closure.marker_names, inputs.T, strict=True)))
-    error = relative_error(np.stack([answer.view_factor, answer.stderr], axis=1), expected)
+    # The last of the answers is the flag of extrapolation.
+    error = relative_error(np.stack(answer[:-1], axis=1), expected)
     same_hash = exported.hash == content_hash(closure)
     failing = int((error > tolerance).any(axis=1).sum())
     own = int(getattr(exported, "failing_rows", 0))

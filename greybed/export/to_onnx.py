@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from greybed.closures import ViewFactorClosure
+from greybed.closures.artifact import Closure
 from greybed.closures.predictors import Forest, Network
-from greybed.closures.viewfactor.visibility import ODDS_BOUND, SPREAD_BOUND
+from greybed.closures.viewfactor.closure import Domain
+from greybed.closures.viewfactor.visibility import ODDS_BOUND, SPREAD_BOUND, Marker
 from greybed.core import InputError
 from greybed.core.exact import TOUCHING, quadrature
 from greybed.core.files import atomic_path
@@ -174,16 +177,21 @@ def _pair_factor(g: Graph) -> str:
     return g.add("Mul", g.add("Mul", x, x), g.sum_columns(terms))
 
 
-def _network(g: Graph, network: Network, features: str) -> str:
+def network_nodes(g: Graph, network: Network, features: str) -> str:
+    """Outputs [N, n] of a network."""
     x = g.add("Div", g.add("Sub", features, network.mean), network.scale)
     for k, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
         x = g.add("Add", g.add("MatMul", x, np.ascontiguousarray(weight)), bias)
         if k + 1 < len(network.weights):
-            x = g.add("Tanh", x)
+            if network.bent:
+                x = g.add("Div", x, g.add("Sqrt", g.add("Add", 1.0, g.add("Mul", x, x))))
+            else:
+                x = g.add("Tanh", x)
     return x
 
 
-def _forest(g: Graph, forest: Forest, features: str) -> str:
+def forest_nodes(g: Graph, forest: Forest, features: str) -> str:
+    """Outputs [N, n] of a forest."""
     from onnx import TensorProto, numpy_helper
 
     # Cut to single precision and back: comparing doubles then agrees with comparing singles.
@@ -209,27 +217,29 @@ def _forest(g: Graph, forest: Forest, features: str) -> str:
         more = [extra, stop, extra, stop]
         branches = [np.concatenate(pair) for pair in zip(branches, more, strict=True)]
         n_inner += len(extra)
-    # A leaf has one target in this operator, so the trees stand twice: for value and for spread.
+    # A leaf has one target in this operator, so the trees stand once for every output.
     true_at, true_leaf, false_at, false_leaf = branches
+    targets = forest.value.shape[1]
 
-    def twice(at: NDArray, is_leaf: NDArray) -> list[int]:
-        return np.concatenate([at, at + np.where(is_leaf, n_leaves, n_inner)]).tolist()
+    def again(at: NDArray, is_leaf: NDArray) -> list[int]:
+        step = np.where(is_leaf, n_leaves, n_inner)
+        return np.concatenate([at + k * step for k in range(targets)]).tolist()
 
     total = g.add(
         "TreeEnsemble",
         cut,
         domain=ML_DOMAIN,
         aggregate_function=1,  # sum
-        n_targets=2,
-        tree_roots=np.concatenate([roots, roots + n_inner]).tolist(),
-        nodes_featureids=np.tile(feature, 2).tolist(),
-        nodes_modes=numpy_helper.from_array(np.zeros(2 * n_inner, np.uint8), "modes"),  # <=
-        nodes_splits=numpy_helper.from_array(np.tile(split, 2), "splits"),
-        nodes_truenodeids=twice(true_at, true_leaf),
-        nodes_trueleafs=np.tile(true_leaf, 2).astype(int).tolist(),
-        nodes_falsenodeids=twice(false_at, false_leaf),
-        nodes_falseleafs=np.tile(false_leaf, 2).astype(int).tolist(),
-        leaf_targetids=np.repeat([0, 1], n_leaves).tolist(),
+        n_targets=targets,
+        tree_roots=np.concatenate([roots + k * n_inner for k in range(targets)]).tolist(),
+        nodes_featureids=np.tile(feature, targets).tolist(),
+        nodes_modes=numpy_helper.from_array(np.zeros(targets * n_inner, np.uint8), "modes"),  # <=
+        nodes_splits=numpy_helper.from_array(np.tile(split, targets), "splits"),
+        nodes_truenodeids=again(true_at, true_leaf),
+        nodes_trueleafs=np.tile(true_leaf, targets).astype(int).tolist(),
+        nodes_falsenodeids=again(false_at, false_leaf),
+        nodes_falseleafs=np.tile(false_leaf, targets).astype(int).tolist(),
+        leaf_targetids=np.repeat(np.arange(targets), n_leaves).tolist(),
         leaf_weights=numpy_helper.from_array(forest.value[leaf].T.ravel(), "leaves"),
     )
     return g.add("Div", total, float(len(forest.roots)))
@@ -251,7 +261,14 @@ def _in_range(g: Graph, closure: ViewFactorClosure, nearest: str) -> str:
     valid = ""
     if closure.quantity != "wallfactor":
         valid = g.add("LessOrEqual", nearest, 1.0 / (1.0 - TOUCHING))
-    for marker in closure.markers.markers:
+    sound = range_nodes(g, closure.markers.markers)
+    return g.add("And", valid, sound) if valid else sound
+
+
+def range_nodes(g: Graph, markers: Sequence[Marker]) -> str:
+    """Whether all markers lie in their ranges; false for NaN."""
+    valid = ""
+    for marker in markers:
         lower = g.add("Greater" if marker.low_open else "GreaterOrEqual", marker.name, marker.low)
         high = min(marker.high, float(np.finfo(np.float64).max))
         upper = g.add("LessOrEqual", marker.name, high)
@@ -260,8 +277,8 @@ def _in_range(g: Graph, closure: ViewFactorClosure, nearest: str) -> str:
     return valid
 
 
-def _outside(g: Graph, closure: ViewFactorClosure, features: str) -> str:
-    domain = closure.domain
+def outside_nodes(g: Graph, domain: Domain, features: str) -> str:
+    """Whether features lie outside the training data."""
     beyond = g.add(
         "Or", g.add("Less", features, domain.low), g.add("Greater", features, domain.high)
     )
@@ -278,9 +295,9 @@ def _fill(g: Graph, closure: ViewFactorClosure) -> None:
     features = g.add("Concat", *(g.column(name) for name in parts.features), axis=1)
     predictor = closure.predictor
     if isinstance(predictor, Network):
-        raw = _network(g, predictor, features)
+        raw = network_nodes(g, predictor, features)
     else:
-        raw = _forest(g, predictor, features)
+        raw = forest_nodes(g, predictor, features)
     first = g.add("Gather", raw, np.array(0, dtype=np.int64), axis=1)
     second = g.add("Gather", raw, np.array(1, dtype=np.int64), axis=1)
     if closure.kind == "mlp":
@@ -292,7 +309,7 @@ def _fill(g: Graph, closure: ViewFactorClosure) -> None:
     valid = _in_range(g, closure, parts.features[0])
     g.add("Where", valid, factor, np.nan, out=QUANTITIES[closure.quantity].output)
     g.add("Where", valid, error, np.nan, out="stderr")
-    far = g.add("And", g.add("Greater", gate, 0.0), _outside(g, closure, features))
+    far = g.add("And", g.add("Greater", gate, 0.0), outside_nodes(g, closure.domain, features))
     g.add("Or", far, g.add("Not", valid), out="extrapolates")
 
 
@@ -329,9 +346,6 @@ def export_onnx(
     The graph is checked in full before it is written. Everything is computed in double precision,
     a forest's branches in single precision as in Python.
     """
-    import onnx
-    from onnx import TensorProto, helper
-
     word = export_name(closure, name)
     if closure.markers.name not in FORMULAE:
         raise InputError(
@@ -340,19 +354,30 @@ def export_onnx(
         )
     g = Graph()
     _fill(g, closure)
-    # A name as length, since a runtime must take any number of pairs.
+    outputs = (QUANTITIES[closure.quantity].output, "stderr")
+    return write_model(g, closure, closure.markers.markers, outputs, path, word)
+
+
+def write_model(
+    g: Graph,
+    closure: Closure,
+    markers: Sequence[Marker],
+    outputs: Sequence[str],
+    path: str | os.PathLike[str],
+    word: str,
+) -> Path:
+    """Write a graph that has been filled: markers in, doubles and ``extrapolates`` out."""
+    import onnx
+    from onnx import TensorProto, helper
+
+    # A name as length, since a runtime must take any number of rows.
     inputs = [
         helper.make_tensor_value_info(marker.name, TensorProto.DOUBLE, ["N"], marker.meaning)
-        for marker in closure.markers.markers
+        for marker in markers
     ]
-    outputs = [
-        helper.make_tensor_value_info(
-            QUANTITIES[closure.quantity].output, TensorProto.DOUBLE, ["N"]
-        ),
-        helper.make_tensor_value_info("stderr", TensorProto.DOUBLE, ["N"]),
-        helper.make_tensor_value_info("extrapolates", TensorProto.BOOL, ["N"]),
-    ]
-    graph = helper.make_graph(g.nodes, word, inputs, outputs, list(g.constants.values()))
+    given = [helper.make_tensor_value_info(n, TensorProto.DOUBLE, ["N"]) for n in outputs]
+    given.append(helper.make_tensor_value_info("extrapolates", TensorProto.BOOL, ["N"]))
+    graph = helper.make_graph(g.nodes, word, inputs, given, list(g.constants.values()))
     opsets = [helper.make_opsetid("", OPSET)]
     if closure.kind == "forest":
         opsets.append(helper.make_opsetid(ML_DOMAIN, ML_OPSET))

@@ -40,7 +40,7 @@ def fit_forest(train: Rows, calibrate: Rows, *, seed: int) -> Forest:
         max_features=2, random_state=seed, n_jobs=-1,
     )  # fmt: skip
     model.fit(train.features.astype(np.float32), _target(train), sample_weight=_weight(train))
-    forest = _flat([tree.tree_ for tree in model.estimators_])
+    forest = flat_trees([tree.tree_ for tree in model.estimators_])
     return _with_spread(forest, calibrate)
 
 
@@ -53,7 +53,7 @@ def _weight(rows: Rows) -> NDArray[np.float64]:
     return weight / weight.mean()
 
 
-def _flat(trees: list) -> Forest:
+def flat_trees(trees: list) -> Forest:
     """Renumber the nodes of all trees so that siblings stand side by side."""
     roots: list[int] = []
     feature: list[int] = []
@@ -99,7 +99,7 @@ def _below(threshold: float) -> np.float32:
     return np.nextafter(single, np.float32(-np.inf)) if single > threshold else single
 
 
-def _leaves(forest: Forest, features: NDArray[np.float64]) -> NDArray[np.int64]:
+def leaves_of(forest: Forest, features: NDArray[np.float64]) -> NDArray[np.int64]:
     """Leaf of every row in every tree, shape (n_trees, m)."""
     single = features.astype(np.float32)
     node = np.repeat(forest.roots.astype(np.int64)[:, None], len(single), axis=1)
@@ -121,7 +121,7 @@ def _with_spread(forest: Forest, rows: Rows) -> Forest:
     excess = (_target(rows) - predicted) ** 2 - noise**2
     mean = float((weight * excess).sum() / weight.sum())
     spread = np.full(len(forest.feature), np.sqrt(max(mean, 0.0)))
-    for leaf in _leaves(forest, rows.features):
+    for leaf in leaves_of(forest, rows.features):
         total = np.bincount(leaf, weight, minlength=len(spread))
         sums = np.bincount(leaf, weight * excess, minlength=len(spread))
         # Shrunk towards the mean of all rows, because a leaf may hold few of other packings.

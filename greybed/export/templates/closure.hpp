@@ -88,84 +88,10 @@ inline bool in_range({{ typed }}) {
   return sound;
 }
 
-/// Whether features lie outside the training data.
-inline bool outside(const double* features) {
-  bool box = false;
-  double distance2 = 0.0;
-  for (int i = 0; i < {{ features|length }}; ++i) {
-    box = box || features[i] < domain_low()[i] || features[i] > domain_high()[i];
-    double row = 0.0;
-    for (int k = 0; k < {{ features|length }}; ++k) {
-      row += domain_precision()[{{ features|length }} * i + k] * (features[k] - domain_centre()[k]);
-    }
-    distance2 += row * (features[i] - domain_centre()[i]);
-  }
-  return box || distance2 > {{ limit2 }};
-}
+{% include "outside.hpp" %}
 
 {% if kind == "mlp" %}
-/// x = tanh(x) to a few 1e-16, in plain arithmetic that becomes vector instructions.
-/// No step relies on the order of rounding, so -ffast-math cannot break it.
-template <int N>
-inline void squash(double* x) {
-  double y[N];
-  // A loop of its own: a compiler that knows y = -40 in one branch would branch in the next loop.
-  for (int j = 0; j < N; ++j) {
-    const double wide = -2.0 * std::fabs(x[j]);
-    y[j] = wide > -40.0 ? wide : -40.0;  // tanh(20) rounds to 1
-  }
-  for (int j = 0; j < N; ++j) {
-    // e^y = 2^k e^r with |r| <= log(2) / 2; the cast cuts towards zero, which rounds as y <= 0
-    const int k = static_cast<int>(y[j] * 1.4426950408889634 - 0.5);
-    const double r = (y[j] - k * 0.693147180369123816490) - k * 1.90821492927058770002e-10;
-    double e = 1.0 / 6227020800.0;
-    e = e * r + 1.0 / 479001600.0;
-    e = e * r + 1.0 / 39916800.0;
-    e = e * r + 1.0 / 3628800.0;
-    e = e * r + 1.0 / 362880.0;
-    e = e * r + 1.0 / 40320.0;
-    e = e * r + 1.0 / 5040.0;
-    e = e * r + 1.0 / 720.0;
-    e = e * r + 1.0 / 120.0;
-    e = e * r + 1.0 / 24.0;
-    e = e * r + 1.0 / 6.0;
-    e = e * r + 0.5;
-    e = e * r + 1.0;
-    e = e * r + 1.0;
-    const std::uint64_t bits = static_cast<std::uint64_t>(k + 1023) << 52;
-    double power;
-    std::memcpy(&power, &bits, sizeof power);
-    e *= power;
-    x[j] = std::copysign((1.0 - e) / (1.0 + e), x[j]);
-  }
-}
-
-/// y = x W + b; the neurons run innermost so that they share vector instructions.
-template <int N_IN, int N_OUT>
-inline void dense(const double* x, const double* weight, const double* bias, double* y) {
-  double sum[N_OUT];
-  for (int j = 0; j < N_OUT; ++j) sum[j] = bias[j];
-  for (int i = 0; i < N_IN; ++i) {
-    for (int j = 0; j < N_OUT; ++j) sum[j] += x[i] * weight[i * N_OUT + j];
-  }
-  for (int j = 0; j < N_OUT; ++j) y[j] = sum[j];
-}
-
-/// Network: value and spread before their bounds.
-inline void predictor(const double* features, double* raw) {
-  double x_0[{{ layers[0][0] }}];
-  for (int i = 0; i < {{ layers[0][0] }}; ++i) x_0[i] = (features[i] - mean()[i]) / scale()[i];
-{% for n_in, n_out in layers %}
-{% if loop.last %}
-  dense<{{ n_in }}, {{ n_out }}>(x_{{ loop.index0 }}, weight_{{ loop.index0 }}(), bias_{{ loop.index0 }}(), raw);
-{% else %}
-  double x_{{ loop.index }}[{{ n_out }}];
-  dense<{{ n_in }}, {{ n_out }}>(x_{{ loop.index0 }}, weight_{{ loop.index0 }}(), bias_{{ loop.index0 }}(), x_{{ loop.index }});
-  squash<{{ n_out }}>(x_{{ loop.index }});
-{% endif %}
-{% endfor %}
-}
-
+{% include "network.hpp" %}
 /// v in (0, 1): the baseline with its odds bent by at most e^{{ odds_bound }}.
 inline double unblocked_share(double baseline, double raw) {
   const double odds = std::exp({{ odds_bound }} * std::tanh(raw));
@@ -179,67 +105,10 @@ inline double spread(double raw) {
 }
 {% else %}
 {% set n_trees = tables|selectattr("name", "equalto", "roots")|map(attribute="size")|first %}
-/// Forest: mean leaf values. Features are compared in single precision, as they were trained.
-inline void predictor(const double* features, double* raw) {
-  float single[{{ features|length }}];
-  for (int k = 0; k < {{ features|length }}; ++k) single[k] = static_cast<float>(features[k]);
-  const std::int8_t* const which = feature();
-  const float* const cut = threshold();
-  const std::int32_t* const next = following();  // left child, or row of a leaf's values
-  double first = 0.0;
-  double second = 0.0;
-  for (int tree = 0; tree < {{ n_trees }}; ++tree) {
-    std::int32_t node = roots()[tree];
-    while (which[node] >= 0) node = next[node] + (single[which[node]] > cut[node] ? 1 : 0);
-    const double* const leaf = leaf_values() + 2 * static_cast<std::ptrdiff_t>(next[node]);
-    first += leaf[0];
-    second += leaf[1];
-  }
-  raw[0] = first / {{ n_trees }}.0;
-  raw[1] = second / {{ n_trees }}.0;
-}
+{% include "forest.hpp" %}
 {% endif %}
 
-inline std::uint64_t as_bits(double v) {
-  std::uint64_t bits;
-  std::memcpy(&bits, &v, sizeof bits);
-  return bits;
-}
-{% if kind == "forest" %}
-inline std::uint64_t as_bits(float v) {
-  std::uint32_t bits;
-  std::memcpy(&bits, &v, sizeof bits);
-  return bits;
-}
-inline std::uint64_t as_bits(std::int32_t v) {
-  return static_cast<std::uint64_t>(static_cast<std::int64_t>(v));
-}
-inline std::uint64_t as_bits(std::int8_t v) {
-  return static_cast<std::uint64_t>(static_cast<std::int64_t>(v));
-}
-{% endif %}
-
-template <class T>
-inline std::uint64_t fnv(std::uint64_t value, const T* data, std::size_t n) {
-  for (std::size_t k = 0; k < n; ++k) value = (value ^ as_bits(data[k])) * 0x100000001b3ULL;
-  return value;
-}
-
-/// Whether every constant of this header is as it was written.
-inline bool intact() {
-  std::uint64_t value = 0xcbf29ce484222325ULL;
-{% for table in tables %}
-  value = fnv(value, {{ table.name }}(), {{ table.size }});
-{% endfor %}
-  return value == {{ checksum }};
-}
-
-inline bool close(double value, double expected) {
-  const double size = expected < 0.0 ? -expected : expected;
-  const double error = value < expected ? expected - value : value - expected;
-  return error <= {{ tolerance }} * size;
-}
-
+{% include "sound.hpp" %}
 }  // namespace detail
 
 {% if not of_pairs %}

@@ -8,16 +8,18 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from greybed.closures.drag.filtered.features import MARKER_SETS, DragMarkerSet, Slope
+from greybed.closures.drag.filtered.features import MARKER_SETS, DragMarkerSet, Slope, bend
 from greybed.closures.drag.filtered.gate import Gate
 from greybed.closures.drag.filtered.markers import checked_markers
-from greybed.closures.predictors import PREDICTORS, Network, Predictor
+from greybed.closures.predictors import Forest, Network, Predictor
 from greybed.closures.viewfactor.closure import Domain
 
 Array = NDArray[np.float64]
 
 QUANTITY = "filtereddrag"
 CONVENTION = "fraction kept"
+# Neurons of the layers of a network: few, for it is evaluated in every cell and step.
+HIDDEN = (16, 16)
 # Bound of ln H: the kept fraction stays between e^-4 = 0.018 and e^4.
 LOG_BOUND = 4.0
 # Largest standard error of ln H, and largest share of the pressure gradient's force.
@@ -98,7 +100,11 @@ class FilteredDragClosure:
         """A closure with random weights: useless numbers, but every limit already holds."""
         chosen = MARKER_SETS[markers]
         n = len(chosen.feature_names)
-        predictor = PREDICTORS[kind].random(n, seed=seed, outputs=chosen.outputs)
+        predictor: Predictor
+        if kind == "mlp":
+            predictor = Network.random(n, HIDDEN, seed, chosen.outputs, bent=True)
+        else:
+            predictor = Forest.random(n, seed=seed, outputs=chosen.outputs)
         return cls(chosen, predictor, Domain.everywhere(n))
 
     @property
@@ -178,8 +184,7 @@ class FilteredDragClosure:
         if inner is not None:
             for k in range(self.markers.outputs - 1):
                 if k < 2:
-                    bent = np.tanh(raw[:, k] / LOG_BOUND)
-                    outer = gate * (1.0 - bent * bent)
+                    outer = gate * bend(raw[:, k], LOG_BOUND)[1]
                 else:
                     part = logistic(raw[:, 2])
                     outer = gate * SHARE_BOUND * part * (1.0 - part)
@@ -190,7 +195,7 @@ class FilteredDragClosure:
 
 def bounded(kind: str, raw: Array) -> Array:
     """ln H before the gate, inside +- 4; leaves of a forest lie there by themselves."""
-    return raw if kind == "forest" else LOG_BOUND * np.tanh(raw / LOG_BOUND)
+    return raw if kind == "forest" else bend(raw, LOG_BOUND)[0]
 
 
 def logistic(x: Array) -> Array:
