@@ -26,6 +26,8 @@ def move_momentum(st: Stepper, state: State, new: State, dt: float, gammas: list
     for a in st.axes:
         push = -st.mean_gradient[a]
         s = st.rims.strides[a]
+        if st.pushes is not None:
+            _push(st, new.phi, dt, a)
         _twofluid.predict(
             s, dt, f.density, f.gas_density,
             f.gravity[a] + push / f.density, f.gravity[a] + push / f.gas_density, TINY,
@@ -45,6 +47,16 @@ def move_momentum(st: Stepper, state: State, new: State, dt: float, gammas: list
             new.ug[a], new.volume[a],
         )  # fmt: skip
         st.rims.fluxes(new.volume[a], a, False)
+
+
+def _push(st: Stepper, phi: Array, dt: float, a: int) -> None:
+    """Add drag that does not depend on the new slip to the momentum that comes in."""
+    assert st.pushes is not None  # checked by the caller
+    s, f = st.rims.strides[a], st.fluids
+    solid = 0.5 * (phi[s:] + phi[:-s])
+    force = 0.5 * (st.pushes[a][s:] + st.pushes[a][:-s]) * solid * (1.0 - solid) * dt
+    st.array(f"outs{a}")[s:] -= force / f.density
+    st.array(f"outg{a}")[s:] += force / f.gas_density
 
 
 def _leave(st: Stepper, state: State, phi: Array, dt: float) -> None:

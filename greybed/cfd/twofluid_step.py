@@ -77,6 +77,8 @@ class DragCell:
 
 
 Drag = Callable[[Array, Array], Array]
+# One with a method ``linearised(DragCell)`` gives drag over phi and eps as three coefficients times
+# the new slip and three pushes instead, law included.
 Correction = Callable[[DragCell], Array | Sequence[Array]]
 
 
@@ -106,6 +108,8 @@ class Stepper:
         self.pairs = [(a, b) for a in self.axes for b in self.axes if a < b]
         self.solver: Poisson | None = None
         self.report = Report()
+        # Drag that does not vanish with the slip, over phi and eps [N m-3]: see linearised.
+        self.pushes: list[Array] | None = None
         self._scratch: dict[str, Array] = {}
         wide = [self.h[a] for a in self.axes]
         self.size = math.prod(wide) ** (1.0 / len(wide))
@@ -173,6 +177,11 @@ class Stepper:
             _twofluid.slip(state.ug[a], state.us[a], rims.strides[a], k == 0, parts[a], square)
         phi = np.ascontiguousarray(rims.inside(state.phi))
         speed = np.sqrt(rims.inside(square))
+        linearised = getattr(self.correction, "linearised", None)
+        if linearised is not None:
+            coefficients, pushes = linearised(self._drag_cell(state, phi, parts, speed))
+            self.pushes = [self._spread(f"push{a}", one) for a, one in enumerate(pushes)]
+            return [self._spread(f"gamma{a}", one) for a, one in enumerate(coefficients)]
         reynolds = (1.0 - phi) * speed
         reynolds *= f.gas_density * f.diameter / f.viscosity
         force = np.asarray(self.drag(phi, reynolds), dtype=np.float64)
@@ -186,13 +195,14 @@ class Stepper:
                 raise InputError(
                     f"correction: {len(factors)} arrays must be one, or one for x, y and z."
                 )
-        gammas = []
-        for k, one in enumerate(factors):
-            gamma = self.array(f"gamma{k}")
-            rims.inside(gamma)[...] = one
-            rims.cells(gamma)
-            gammas.append(gamma)
-        return gammas
+        return [self._spread(f"gamma{k}", one) for k, one in enumerate(factors)]
+
+    def _spread(self, name: str, cells: Array) -> Array:
+        """Values of the cells in a padded array of that name."""
+        padded = self.array(name)
+        self.rims.inside(padded)[...] = cells
+        self.rims.cells(padded)
+        return padded
 
     def _drag_cell(self, state: State, phi: Array, parts: list[Array], speed: Array) -> DragCell:
         gradients = []

@@ -4,6 +4,7 @@ Examples:
   greybed check bed.closure
   greybed check shipped:viewfactor_mlp_pencil
   greybed check bed.closure --exported cpp,onnx --out runs/check
+  greybed check drag.closure                       # filtered drag: fraction kept
 
 --exported runs the same limiting cases on the compiled C++ header and on the ONNX graph. The exit
 code is 0 if all hold, 1 if one fails, 2 if the file cannot be used.
@@ -19,7 +20,7 @@ from greybed.cli.export import targets
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from greybed.closures import ViewFactorClosure
+    from greybed.closures.artifact import Closure
     from greybed.closures.viewfactor.limits import LimitCase
 
 
@@ -52,7 +53,7 @@ def _plain(cases: list[LimitCase]) -> list[dict[str, Any]]:
     ]
 
 
-def _ranges(closure: ViewFactorClosure) -> str:
+def _ranges(closure: Closure) -> str:
     from numpy import isfinite
 
     from greybed.export.metadata import allowed
@@ -71,19 +72,38 @@ def _ranges(closure: ViewFactorClosure) -> str:
     return "\n".join(lines)
 
 
-def _exported(closure: ViewFactorClosure, target: str, folder: Path) -> dict[str, Any]:
+def _exported(closure: Closure, target: str, folder: Path) -> dict[str, Any]:
     """Limiting cases and golden rows of one exported form."""
+    from greybed.closures import FilteredDragClosure
+    from greybed.closures.drag.filtered import limits as drag_limits
     from greybed.closures.viewfactor.limits import check_limits
-    from greybed.export import CompiledClosure, OnnxClosure, compile_cpp, export_cpp, export_onnx
+    from greybed.export import (
+        CompiledClosure,
+        CompiledDrag,
+        OnnxClosure,
+        OnnxDrag,
+        compile_cpp,
+        export_cpp,
+        export_drag_cpp,
+        export_drag_onnx,
+        export_onnx,
+    )
     from greybed.export.replay import CPP_TOLERANCE, ONNX_TOLERANCE, replay
 
-    form: CompiledClosure | OnnxClosure
+    form: CompiledClosure | OnnxClosure | CompiledDrag | OnnxDrag
+    tolerance = CPP_TOLERANCE if target == "cpp" else ONNX_TOLERANCE
+    if isinstance(closure, FilteredDragClosure):
+        if target == "cpp":
+            form = CompiledDrag(compile_cpp(export_drag_cpp(closure, folder), folder))
+        else:
+            form = OnnxDrag(export_drag_onnx(closure, folder / "closure.onnx"))
+        rows = replay(closure, form, tolerance)
+        return {"cases": drag_limits.check_limits(closure, form.predict), "rows": rows}
     if target == "cpp":
         form = CompiledClosure(compile_cpp(export_cpp(closure, folder), folder))
-        rows = replay(closure, form, CPP_TOLERANCE)
     else:
         form = OnnxClosure(export_onnx(closure, folder / "closure.onnx"))
-        rows = replay(closure, form, ONNX_TOLERANCE)
+    rows = replay(closure, form, tolerance)
     return {"cases": check_limits(closure, evaluate=form.evaluate), "rows": rows}
 
 
@@ -93,8 +113,9 @@ def run(options: argparse.Namespace) -> int:
     import tempfile
     from pathlib import Path
 
-    from greybed.closures import content_hash, load, model_path
+    from greybed.closures import FilteredDragClosure, content_hash, load_any, model_path
     from greybed.closures.artifact import GOLDEN_ROWS, GOLDEN_TOLERANCE
+    from greybed.closures.drag.filtered import limits as drag_limits
     from greybed.closures.viewfactor.limits import check_limits
     from greybed.core import VerificationError
     from greybed.core.files import output_folder, write_summary
@@ -102,12 +123,15 @@ def run(options: argparse.Namespace) -> int:
     out = output_folder(options.out) if options.out else None
     file = model_path(options.model)
     try:
-        closure = load(file)  # replays the golden rows
+        closure = load_any(file)  # replays the golden rows
     except VerificationError as error:
         print(f"greybed check: {error}", file=sys.stderr)
         return 1
     hash_ = content_hash(closure)
-    cases = check_limits(closure)
+    if isinstance(closure, FilteredDragClosure):
+        cases = drag_limits.check_limits(closure, n=1_000_000)
+    else:
+        cases = check_limits(closure)
     print(f"{options.model}: {closure.quantity}, {closure.kind}, markers {closure.markers.name}")
     print(f"  hash {hash_}\n{_ranges(closure)}\n{_table(cases)}")
     print(f"  golden rows: {GOLDEN_ROWS} of {GOLDEN_ROWS} to {GOLDEN_TOLERANCE:g}")

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from greybed.closures import ViewFactorClosure
+    from greybed.closures.artifact import Closure
     from greybed.closures.term import GreyBoxTerm
 
 TARGETS = ("cpp", "onnx")
@@ -48,31 +48,43 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _replayed(
-    closure: ViewFactorClosure, target: str, folder: Path, name: str | None
-) -> dict[str, Any]:
+def _replayed(closure: Closure, target: str, folder: Path, name: str | None) -> dict[str, Any]:
     """Export to one target and replay the golden rows; ``passed`` is None without a compiler."""
+    import tempfile
+
+    from greybed.closures import FilteredDragClosure
+    from greybed.export import (
+        CompiledClosure,
+        CompiledDrag,
+        OnnxClosure,
+        OnnxDrag,
+        compile_cpp,
+        export_cpp,
+        export_drag_cpp,
+        export_drag_onnx,
+        export_onnx,
+        find_compiler,
+    )
     from greybed.export.metadata import export_name
+    from greybed.export.replay import CPP_TOLERANCE, ONNX_TOLERANCE, replay
 
     word = export_name(closure, name)
     if target == "onnx":
-        from greybed.export import OnnxClosure, export_onnx
-        from greybed.export.replay import ONNX_TOLERANCE, replay
-
-        path = export_onnx(closure, folder / f"{word}.onnx", word)
-        return replay(closure, OnnxClosure(path), ONNX_TOLERANCE)
-
-    import tempfile
-
-    from greybed.export import CompiledClosure, compile_cpp, export_cpp, find_compiler
-    from greybed.export.replay import CPP_TOLERANCE, replay
-
-    header = export_cpp(closure, folder, word)
+        file = folder / f"{word}.onnx"
+        if isinstance(closure, FilteredDragClosure):
+            return replay(closure, OnnxDrag(export_drag_onnx(closure, file, word)), ONNX_TOLERANCE)
+        return replay(closure, OnnxClosure(export_onnx(closure, file, word)), ONNX_TOLERANCE)
+    drag = isinstance(closure, FilteredDragClosure)
+    if isinstance(closure, FilteredDragClosure):
+        header = export_drag_cpp(closure, folder, word)
+    else:
+        header = export_cpp(closure, folder, word)
     compiler = find_compiler()
     if compiler is None:
         return {"passed": None, "reason": "no C++ compiler found: install one or set CXX"}
     with tempfile.TemporaryDirectory() as build:
-        program = CompiledClosure(compile_cpp(header, build))
+        built = compile_cpp(header, build)
+        program = CompiledDrag(built) if drag else CompiledClosure(built)
         return {**replay(closure, program, CPP_TOLERANCE), "compiler": " ".join(compiler)}
 
 
@@ -98,13 +110,13 @@ def run(options: argparse.Namespace) -> int:
     import os
     import tempfile
 
-    from greybed.closures import content_hash, load, model_path
+    from greybed.closures import content_hash, load_any, model_path
     from greybed.closures.term import is_term, load_term
     from greybed.core.files import atomic_path, output_folder, write_summary
 
     model = model_path(options.model)
     term = load_term(model) if is_term(model) else None
-    closure = None if term is not None else load(model)
+    closure = None if term is not None else load_any(model)
     folder = output_folder(options.out)
     results: dict[str, Any] = {}
     # Files reach their place only after the replay: a header that computes wrongly is never seen.
@@ -136,7 +148,7 @@ def run(options: argparse.Namespace) -> int:
         for file in files:
             with atomic_path(folder / file) as temporary:
                 os.replace(workplace / file, temporary)
-    sealed = term.content_hash() if term is not None else content_hash(load(model))
+    sealed = term.content_hash() if term is not None else content_hash(load_any(model))
     summary = write_summary(
         folder,
         "export",

@@ -139,11 +139,11 @@ def run(options: argparse.Namespace) -> int:
 
     file = options.file
     if str(file).startswith(PREFIX) or str(file).endswith(SUFFIX):
-        from greybed.closures import load
+        from greybed.closures import load_any
         from greybed.closures.card import describe_closure, report_closure
 
         file = model_path(file)
-        results = describe_closure(load(file))
+        results = describe_closure(load_any(file))
         print(report_closure(results, str(options.file)))
     else:
         results = describe(read_input(options))

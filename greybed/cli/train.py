@@ -1,9 +1,10 @@
-"""Train a closure from a data set and score it on packings that it has not seen.
+"""Train a closure from a data set and score it on packings, or cases, that it has not seen.
 
-Example:
+Examples:
   greybed train viewfactor runs/viewfactor.h5 --model mlp --out runs
+  greybed train drag runs/filtered_drag.h5 --markers gradient --out runs
 
-Writes NAME.closure (one file: weights, markers, ranges, golden rows), NAME.html (errors by regime,
+Writes NAME.closure (one file: weights, markers, ranges, golden rows), NAME.html (errors,
 calibration, learning curve, model card) and summary.json. The exit code is 1 if a limiting case
 fails.
 """
@@ -14,30 +15,57 @@ import argparse
 import time
 from pathlib import Path
 
+# Markers of view, wall and exchange factors.
+FACTORS = ("pencil", "published", "wall", "exchange")
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``greybed train``."""
-    parser.add_argument("quantity", choices=("viewfactor",), help="what the closure gives")
+    parser.add_argument(
+        "quantity",
+        choices=("viewfactor", "drag"),
+        help="what the closure gives: view factors, or the fraction kept of drag on coarse grids",
+    )
     parser.add_argument("data", help="data set from greybed dataset")
     parser.add_argument("--model", choices=("mlp", "forest"), default="mlp", help="default: mlp")
     parser.add_argument(
         "--markers",
-        choices=("pencil", "published", "wall", "exchange"),
-        default="pencil",
+        choices=("pencil", "published", "wall", "exchange", "plain", "gradient", "linear", "full"),
         help="pencil: real blockers on a pencil of lines; published: r_j/d, spheres between, "
         "r_j/r_i, solid fraction; wall: from spheres to walls; "
-        "exchange: absorption after reflections (default: pencil)",
+        "exchange: absorption after reflections (default: pencil); of drag, plain: flow only, "
+        "gradient: with the pressure gradient, linear: its force beside the drag, full: both "
+        "(default: plain)",
     )
     parser.add_argument("--seed", type=int, default=0, metavar="S", help="default: 0")
     parser.add_argument(
-        "--epochs", type=int, metavar="N", help="default: 40, up to 600 where rows are few"
+        "--epochs",
+        type=int,
+        metavar="N",
+        help="default: 40, of view factors up to 600 where rows are few",
     )
     parser.add_argument(
         "--no-curve", action="store_true", help="leave out the learning curve, which takes as long "
         "as the training itself",
     )  # fmt: skip
-    parser.add_argument("--name", help="name of the file (default: viewfactor_MODEL_MARKERS)")
+    parser.add_argument("--name", help="name of the file (default: QUANTITY_MODEL_MARKERS)")
     parser.add_argument("--out", required=True, metavar="DIR", help="folder to write into")
+
+
+def name_of(options: argparse.Namespace, quantity: str) -> str:
+    """Name of the files.
+
+    Raises
+    ------
+    InputError
+        If the one that was given has folders.
+    """
+    from greybed.core import InputError
+
+    name = str(options.name or f"{quantity}_{options.model}_{options.markers}")
+    if options.name == "" or not name.strip(". ") or Path(name).name != name:
+        raise InputError(f"--name = {options.name!r} is no file name; give one without folders.")
+    return name
 
 
 def run(options: argparse.Namespace) -> int:
@@ -55,11 +83,19 @@ def run(options: argparse.Namespace) -> int:
 
     if options.epochs is not None and options.epochs < 1:
         raise InputError(f"--epochs = {options.epochs} must be at least 1.")
+    known = ("plain", "gradient", "linear", "full") if options.quantity == "drag" else FACTORS
+    options.markers = options.markers or known[0]
+    if options.markers not in known:
+        raise InputError(
+            f"--markers {options.markers} is not for {options.quantity}; take one of "
+            f"{', '.join(known)}."
+        )
+    if options.quantity == "drag":
+        from greybed.cli.train_drag import run_drag
+
+        return run_drag(options)
     quantity = MARKER_SETS[options.markers].quantity
-    name = f"{quantity}_{options.model}_{options.markers}"
-    name = name if options.name is None else options.name
-    if not name.strip(". ") or Path(name).name != name:
-        raise InputError(f"--name = {name!r} is no file name; give one without folders.")
+    name = name_of(options, quantity)
     data = read(options.data)
     # Before the work: a name that is too long, or taken by a folder.
     target = writable_file(output_folder(options.out) / (name + SUFFIX))

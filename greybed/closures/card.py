@@ -6,13 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from greybed.closures.artifact import content_hash
-from greybed.closures.viewfactor.closure import ViewFactorClosure
+from greybed.closures.artifact import Closure, content_hash
+from greybed.closures.drag.filtered.card import drag_lines
+from greybed.closures.drag.filtered.closure import QUANTITY
 
 UNITS = {
     "viewfactor": "view factor between spheres",
     "wallfactor": "view factor sphere to wall",
     "exchange": "exchange factor between spheres",
+    QUANTITY: "filtered drag: fraction kept along gravity and across it",
 }
 WORDS = {
     "factor": "F",
@@ -40,7 +42,7 @@ def regime_name(row: dict[str, Any]) -> str:
     return f"{word} {low:.3g} to {min(high, 1.0) if row['by'] == 'blocked_fraction' else high:.3g}"
 
 
-def describe_closure(closure: ViewFactorClosure) -> dict[str, Any]:
+def describe_closure(closure: Closure) -> dict[str, Any]:
     """What a closure is and what its card says, as plain values."""
     arrays = closure.predictor.arrays().values()
     return {
@@ -65,6 +67,8 @@ def report_closure(results: dict[str, Any], title: str) -> str:
     ]
     if not card:
         return "\n".join([*lines, "  untrained: no card"])
+    if results["quantity"] == QUANTITY:
+        return "\n".join([*lines, *drag_lines(card)])
     packings = ", ".join(f"{n} to {split}" for split, n in card.get("packings", {}).items())
     fractions = card.get("solid_fractions") or [float("nan")]
     lines += [

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from greybed.closures.drag import MIXTURES, DragLaw, drag_law, mixture_factor, sauter_mean
 from greybed.core.errors import InputError
+from greybed.coupling.filtered_drag import FilteredDrag
 from greybed.coupling.forces import LIFTS
 from greybed.coupling.void_fraction import METHODS
 
@@ -51,9 +52,11 @@ class Settings:
         Coefficient, 0.5 for spheres, 0 for none [-].
     lift : str
         ``none`` or ``saffman-mei``.
-    correction : callable, optional
+    correction : callable or FilteredDrag, optional
         ``H(phi, slip, size)`` for solid fractions (n,), slips (n, 3) and the edge of a cube of a
-        cell's volume [m]: the share of drag that is kept, as filtered models give it.
+        cell's volume [m]: the fraction of drag that is kept. A
+        :class:`greybed.coupling.filtered_drag.FilteredDrag` keeps different fractions along
+        gravity and across it, and gives their slopes to an implicit treatment.
 
     Raises
     ------
@@ -71,7 +74,7 @@ class Settings:
     buoyancy: bool = True
     added_mass: float = 0.0
     lift: str = "none"
-    correction: Correction | None = None
+    correction: Correction | FilteredDrag | None = None
 
     def __post_init__(self) -> None:
         for name, known in (
@@ -102,9 +105,9 @@ class DragTerms:
 
     Attributes
     ----------
-    coefficient : array, shape (n,)
+    coefficient : array, shape (n,), or (n, 3) where axes differ
         k [N s/m].
-    steepness : array, shape (n,)
+    steepness : array, of the same shape
         Slope of the force over the slip, over k [-].
     void, reynolds : array, shape (n,)
         Void fraction and Re [-].
@@ -117,17 +120,23 @@ class DragTerms:
     void: Array
     reynolds: Array
     outside: float
+    push: Array | None = None  # of what does not vanish with the slip (n, 3) [N]
 
     def over(self, void: Array) -> DragTerms:
         """The same over the void fraction, as model B has it."""
-        return replace(self, coefficient=self.coefficient / void)
+        each = void if self.coefficient.ndim == 1 else void[:, None]
+        push = None if self.push is None else self.push / void[:, None]
+        return replace(self, coefficient=self.coefficient / each, push=push)
 
 
 def drag_terms(
     settings: Settings, slip: Array, void: Array, d: Array, density: float, viscosity: float,
-    size: float,
+    size: float, gradient: Array | None = None,
 ) -> DragTerms:  # fmt: skip
-    """Drag of particles with slips (n, 3) [m/s], void fractions (n,) [-] and diameters (n,) [m]."""
+    """Drag of particles with slips (n, 3) [m/s], void fractions (n,) [-] and diameters (n,) [m].
+
+    ``gradient`` is that of the pressure (n, 3) [Pa/m], for corrections that need it.
+    """
     if not len(d):
         return DragTerms(np.zeros(0), np.ones(0), void, np.zeros(0), 0.0)
     phi = 1.0 - void
@@ -154,6 +163,13 @@ def drag_terms(
             f"{re[who]:.3g} [-]; F must be finite and at least 0: take another law."
         )
     coefficient = 3.0 * math.pi * viscosity * d * void * force
+    if isinstance(settings.correction, FilteredDrag):
+        filtered = settings.correction
+        factor, steep, push = filtered.particles(phi, slip, size, gradient)
+        each = coefficient[:, None]
+        return DragTerms(
+            each * factor, steep, void, re, outside, each * push if filtered.linear else None
+        )
     if settings.correction is not None:
         kept = np.asarray(settings.correction(phi, slip, size), dtype=np.float64)
         if kept.shape != phi.shape or not (np.isfinite(kept).all() and (kept >= 0.0).all()):

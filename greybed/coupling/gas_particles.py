@@ -188,9 +188,7 @@ class GasParticles:
         steady = self._steady(overlaps, terms, seen, dt)
         k, target = self._linear(terms, seen, dt)
         place = sim._state.place
-        total, aimed = self.transfer.give(
-            place, np.broadcast_to(k[:, None], target.shape), k[:, None] * target
-        )
+        total, aimed = self.transfer.give(place, k, k * target)
         loads: Any = None
         if steady is not None:
             loads, _ = self.transfer.give(place, -steady, np.zeros_like(steady))
@@ -225,7 +223,7 @@ class GasParticles:
         if self.settings.treatment != "explicit":
             at = report.velocity
         new = self._read(at)
-        force = k[:, None] * (new - target)
+        force = k * (new - target)
         given = dt * force.sum(axis=0)
         parts = dt * np.abs(force).sum(axis=0)
         lost = [dt * (b * u - a) for b, u, a in zip(total, at, aimed, strict=True)]
@@ -272,30 +270,40 @@ class GasParticles:
     def _note(self, terms: DragTerms) -> None:
         """Keep the fastest relaxation of a particle [1/s], for the length of the next step."""
         mass = self.simulation._state.motion[:, 6]
-        self._rate = float((terms.coefficient / mass).max(initial=0.0))
+        k = terms.coefficient if terms.coefficient.ndim == 1 else terms.coefficient.max(axis=1)
+        self._rate = float((k / mass).max(initial=0.0))
 
     def _terms(self, overlaps: Overlaps, seen: Array) -> DragTerms:
         state, fluid = self.simulation._state, self.gas.fluid
         void = overlaps.mean(self.void[..., None])[:, 0]
         slip = seen - state.motion[:, :3]
+        gradient = None
+        if getattr(self.settings.correction, "needs_gradient", False):
+            gradient = overlaps.mean(self._slopes())
         terms = drag_terms(
             self.settings, slip, void, 2.0 * state.place[:, 3], fluid.density, fluid.viscosity,
-            self.gas.grid.cell_volume ** (1.0 / 3.0),
+            self.gas.grid.cell_volume ** (1.0 / 3.0), gradient,
         )  # fmt: skip
         # Model B: the gas bears all of the pressure gradient, drag what particles bear in model A.
         return terms if self.gas.model == "A" else terms.over(void)
 
     def _linear(self, terms: DragTerms, seen: Array, dt: float) -> tuple[Array, Array]:
-        """Coefficients (n,) and targets (n, 3): the force is k (u - target) with the new u."""
+        """Coefficients and targets (n, 3): the force is k (u - target) with the new u."""
         v = self.simulation._state.motion[:, :3]
+        secant, slope = terms.coefficient, terms.steepness
+        if secant.ndim == 1:
+            secant, slope = secant[:, None], slope[:, None]
+        secant = np.broadcast_to(secant, v.shape)
         if self.settings.treatment != "implicit":
-            return terms.coefficient, v
-        mass = self.simulation._state.motion[:, 6]
+            return secant, v if terms.push is None else v - terms.push / secant
+        mass = self.simulation._state.motion[:, 6][:, None]
         # Newton's method about the old slip, then the particle's own new velocity.
-        steep = terms.coefficient * terms.steepness
-        offset = (1.0 - terms.coefficient / steep)[:, None] * (seen - v)
+        steep = secant * slope
+        offset = (1.0 - secant / steep) * (seen - v)
+        if terms.push is not None:
+            offset = offset - terms.push / steep
         free = np.abs(self.simulation._contact_loads()[:, :3]).max(axis=1) == 0.0
-        fall = self.simulation.gravity + self._buoyancy(mass) / mass[:, None]
+        fall = self.simulation.gravity + self._buoyancy(mass[:, 0]) / mass
         # A particle that rests on others is not about to fall.
         target = v + offset + np.where(free[:, None], dt * fall, 0.0)
         return steep / (1.0 + steep * dt / mass), target
@@ -319,7 +327,10 @@ class GasParticles:
                 kept[: len(old)] = old[: len(kept)]
             change = seen - kept[labels]
             acceleration = np.where(np.isfinite(change), change / dt, 0.0)
-            known = terms.coefficient[:, None] * slip + mass[:, None] * self.simulation.gravity
+            k = terms.coefficient if terms.coefficient.ndim == 2 else terms.coefficient[:, None]
+            known = k * slip + mass[:, None] * self.simulation.gravity
+            if terms.push is not None:
+                known += terms.push
             known += self._buoyancy(mass)
             if settings.pressure and self.gas.model == "A":
                 known += self._by_pressure(overlaps)
@@ -335,11 +346,15 @@ class GasParticles:
 
     def _by_pressure(self, overlaps: Overlaps) -> Array:
         """Minus the integral of the pressure gradient over each particle, (n, 3) [N]."""
-        slopes = cell_slopes(self.gas.pressure, self.gas.grid) + imposed_gradient(self.gas)
+        return -overlaps.integral(self._slopes())
+
+    def _slopes(self) -> Array:
+        """Pressure gradient of the cells, smoothed as all that is exchanged is [Pa/m]."""
+        slopes: Array = cell_slopes(self.gas.pressure, self.gas.grid) + imposed_gradient(self.gas)
         if not self.smoother.idle:
             for c in range(3):
                 slopes[..., c] = self.smoother.cells(slopes[..., c])
-        return -overlaps.integral(slopes)
+        return slopes
 
     def _buoyancy(self, mass: Array) -> Array:
         """What the gas's own weight lifts, where its pressure leaves that out, (n, 3) [N]."""

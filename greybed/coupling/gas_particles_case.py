@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from greybed.closures.drag import MIXTURES, drag_law
+from greybed.closures.drag.filtered.naming import kept_drag
 from greybed.core.config import choice, quantity, read_case, tables, vector, whole
 from greybed.core.errors import InputError
 from greybed.coupling.drag_exchange import TREATMENTS, Settings
@@ -45,13 +47,18 @@ class CouplingTable:
     lift: str = choice(tuple(LIFTS), "none")
     courant: float = quantity("dimensionless", 0.5, above=0.0, at_most=1.0)  # of the gas [-]
     most_steps: int = whole(1000, at_least=1)  # of the particles in one of the gas [-]
+    # Filtered drag: radl-sundaresan, igci, milioli, a .closure file or shipped:NAME.
+    correction: Path | None = None
+    filter_ratio: float = quantity("dimensionless", 1.0)  # size of a filter over a cell's [-]
 
     def __post_init__(self) -> None:
         drag_law(self.drag)
+        if self.correction is not None:
+            kept_drag(self.correction)
 
     @property
     def settings(self) -> Settings:
-        """The settings themselves."""
+        """The settings themselves, but for the correction, which needs the particles."""
         names = (
             "drag", "treatment", "width", "void", "least_void", "mixture", "pressure", "buoyancy",
             "added_mass", "lift",

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from greybed.cfd.gas import GasSolver
+from greybed.closures.drag import drag_law
+from greybed.closures.drag.filtered import Material
 from greybed.core.errors import InputError
 from greybed.core.packing import Packing
+from greybed.coupling.drag_exchange import Settings
+from greybed.coupling.filtered_drag import filtered_drag
 from greybed.coupling.gas_heat import BedRadiation, GasHeat, prandtl_of
 from greybed.coupling.gas_particles import ExchangeReport, GasParticles
 from greybed.coupling.gas_particles_case import GasParticlesCase
@@ -75,8 +81,27 @@ class GasParticlesRun(ParticleRun):
                 prandtl_of(self.gas, case.gas.heat_capacity, case.gas.conductivity),
                 nusselt=warm.nusselt, radiation=self._radiation(), contacts=warm.contacts,
             )  # fmt: skip
-        self.coupled = GasParticles(self.gas, self.simulation, case.coupling.settings, heat=heat)
+        self.coupled = GasParticles(self.gas, self.simulation, self._settings(), heat=heat)
         self.tally.history[0] |= self._gas_sample()
+
+    def _settings(self) -> Settings:
+        """How gas and particles act on each other, filtered drag with the mean particle."""
+        case, table = self.case, self.case.coupling
+        if table.correction is None:
+            return table.settings
+        state = self.simulation._state
+        radius = float(state.place[:, 3].mean())
+        volume = float((4.0 / 3.0 * math.pi * state.place[:, 3] ** 3).sum())
+        fluid = case.gas.fluid
+        material = Material(
+            2.0 * radius, float(state.motion[:, 6].sum()) / volume, fluid.density,
+            fluid.viscosity, math.hypot(*case.gravity),
+        )  # fmt: skip
+        correction = filtered_drag(
+            table.correction, material, drag_law(table.drag), case.gravity,
+            filter_ratio=table.filter_ratio, gas_weight=case.gas_gravity,
+        )  # fmt: skip
+        return replace(table.settings, correction=correction)
 
     def _radiation(self) -> BedRadiation | None:
         warm, case = self.case.gas_heat, self.case

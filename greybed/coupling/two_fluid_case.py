@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,10 @@ from greybed.cfd import rims
 from greybed.cfd.kinetic import Granular
 from greybed.cfd.twofluid import TwoFluid
 from greybed.closures.drag import drag_law
+from greybed.closures.drag.filtered import Material
 from greybed.core.config import choice, quantity, read_case, tables, vector, whole
 from greybed.core.errors import InputError
+from greybed.coupling.filtered_drag import FilteredDrag, filtered_drag
 from greybed.coupling.flow_tables import (
     SIDE_KINDS,
     FlowOutput,
@@ -77,6 +80,9 @@ class TwoFluidCase:
     seed: int = whole(0, at_least=0)
     tolerance: float = quantity("dimensionless", 1e-6, above=0.0, at_most=0.1)  # of pressure [-]
     drag: str = "wen-yu"
+    # Filtered drag: radl-sundaresan, igci, milioli, a .closure file or shipped:NAME.
+    correction: Path | None = None
+    filter_ratio: float = quantity("dimensionless", 1.0)  # size of a filter over a cell's [-]
     grid: GridTable
     gas: TwoFluidGas
     solids: SolidsTable
@@ -87,6 +93,7 @@ class TwoFluidCase:
         drag_law(self.drag)
         check_sides(self.side, self.grid)
         check_cells(self.grid, self.solids.diameter)
+        self.filtered()
         warm = [s for s in self.side if s.temperature is not None]
         if warm:
             raise InputError(
@@ -108,6 +115,19 @@ class TwoFluidCase:
         if not phi.any():
             raise InputError("solids: lower and upper hold no cell; widen the region.")
         return phi
+
+    def filtered(self) -> FilteredDrag | None:
+        """The correction of drag, if there is one."""
+        if self.correction is None:
+            return None
+        material = Material(
+            self.solids.diameter, self.solids.density, self.gas.density, self.gas.viscosity,
+            math.hypot(*self.gravity),
+        )  # fmt: skip
+        return filtered_drag(
+            self.correction, material, drag_law(self.drag), self.gravity,
+            filter_ratio=self.filter_ratio,
+        )  # fmt: skip
 
     def solver(self) -> TwoFluid:
         """The solver at the start."""
@@ -131,6 +151,7 @@ class TwoFluidCase:
             ),
             gravity=self.gravity, sides=made, time_step=self.time_step, courant=self.courant,
             longest_step=self.longest_step, tolerance=self.tolerance,
+            correction=self.filtered(),
         )  # fmt: skip
 
 

@@ -74,11 +74,12 @@ def _context(closure: FilteredDragClosure, name: str) -> dict[str, Any]:
     with np.errstate(over="ignore"):
         limit2 = float(finite(np.float64(domain.limit) ** 2))
     own, layers = _predictor_tables(closure)
+    n = len(domain.low)
     tables = [
         doubles("domain_low", finite(domain.low)),
         doubles("domain_high", finite(domain.high)),
         doubles("domain_centre", domain.centre),
-        doubles("domain_precision", domain.precision),
+        doubles("domain_precision", np.pad(domain.precision, ((0, 0), (0, -n % 4)))),
         *own,
     ]
     inputs, outputs = golden_rows(closure)
@@ -92,7 +93,7 @@ def _context(closure: FilteredDragClosure, name: str) -> dict[str, Any]:
         "markers": chosen.markers,
         "allowed": allowed,
         "features": [(label, "") for label in chosen.feature_names],
-        "gradient": chosen.name == "gradient",
+        "gradient": chosen.marked,
         "pressure": chosen.pressure,
         "outputs": chosen.outputs,
         "gate": {k: repr(v) for k, v in vars(closure.gate).items()},
@@ -103,6 +104,7 @@ def _context(closure: FilteredDragClosure, name: str) -> dict[str, Any]:
         "parcel_rate": repr(PARCEL_RATE),
         "fade": repr(FADE),
         "limit2": repr(limit2),
+        "columns": n + -n % 4,
         "layers": layers,
         "tables": tables,
         "golden": [doubles("golden_markers", inputs), doubles("golden_answers", outputs)],

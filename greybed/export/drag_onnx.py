@@ -67,7 +67,7 @@ def _features(g: Graph, closure: FilteredDragClosure) -> str:
         _bend(g, up, shape.SLIP_BEND),
         g.add("Log", g.add("Add", across2, shape.SMALL_ACROSS)),
     ]
-    if closure.markers.name == "gradient":
+    if closure.markers.marked:
         scale = g.add("Mul", g.add("Add", phi, shape.SMALL_FRACTION), "drag_ratio")
         up2 = g.add("Add", g.add("Mul", up, up), shape.SMALL_SLIP2)
         wide = g.add("Add", across2, shape.SMALL_SLIP2)
@@ -106,7 +106,7 @@ def _fill(g: Graph, closure: FilteredDragClosure) -> None:
         log = _bend(g, column, LOG_BOUND) if learnt else column
         kept.append(g.add("Exp", g.add("Mul", gate, g.add("Sub", log, parcels))))
     share = g.add("Mul", 0.0, gate)
-    if closure.markers.outputs == 4:
+    if closure.markers.linear:
         share = g.add("Mul", g.add("Mul", gate, SHARE_BOUND), _logistic(g, columns[2]))
     spread = columns[-1]
     if learnt:

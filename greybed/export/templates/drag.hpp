@@ -26,11 +26,9 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
-{% if kind == "mlp" %}
 #ifdef __AVX__
 #include <immintrin.h>
 #endif
-{% endif %}
 
 namespace greybed {
 namespace {{ name }} {
@@ -76,7 +74,31 @@ inline bool in_range(const double* m) {
   return sound;
 }
 
-{% include "outside.hpp" %}
+{% include "vectors.hpp" %}
+/// Whether features lie outside the training data.
+inline bool outside(const double* features) {
+  bool box = false;
+  double away[{{ n_features }}];
+{% for b in range(columns // 4) %}
+  v4 row_{{ b }} = {};
+{% endfor %}
+  v4 w;
+  for (int i = 0; i < {{ n_features }}; ++i) {
+    box = box || features[i] < domain_low()[i] || features[i] > domain_high()[i];
+    away[i] = features[i] - domain_centre()[i];
+{% for b in range(columns // 4) %}
+    load(domain_precision() + {{ columns }} * i + {{ 4 * b }}, w);
+    add_scaled(row_{{ b }}, w, away[i]);
+{% endfor %}
+  }
+  double all[{{ columns }}];
+{% for b in range(columns // 4) %}
+  store(row_{{ b }}, all + {{ 4 * b }});
+{% endfor %}
+  double distance2 = 0.0;
+  for (int i = 0; i < {{ n_features }}; ++i) distance2 += all[i] * away[i];
+  return box || distance2 > {{ limit2 }};
+}
 
 {% if kind == "mlp" %}
 {% include "drag_network.hpp" %}
@@ -135,14 +157,14 @@ inline double log_positive(double q, double* slope) {
 }
 
 {% endif %}
-inline void features_of(const double* m, Features* f) {
+inline void features_of(const double* m, double log_reynolds, Features* f) {
   const double phi = m[0];
   const double up = m[3];
   const double across2 = m[4] * m[4];
   f->value[0] = phi;
   f->value[1] = std::log(phi + {{ small.dilute }});
   f->value[2] = std::log(m[1] + {{ small.filter }});
-  f->value[3] = std::log(m[2]);
+  f->value[3] = log_reynolds;
   f->value[4] = bend(up, {{ small.slip_bend }}, &f->bent_up);
   f->value[5] = std::log(across2 + {{ small.across }});
   f->log_across = 1.0 / (across2 + {{ small.across }});
@@ -167,7 +189,8 @@ inline void features_of(const double* m, Features* f) {
 }
 
 /// Kept fractions and, in the rows of slope, derivatives of ln H along, ln H across and the share
-/// with respect to slip_up, slip_across squared, gradient_work and drag_ratio.
+/// with respect to slip_up, slip_across squared, gradient_work and drag_ratio. Slopes come without
+/// the standard error: who wants the one does not want the other, and both take time.
 struct Kept {
   double along;
   double across;
@@ -177,7 +200,7 @@ struct Kept {
   double slope[3][4];
 };
 
-inline void kept(const double* m, bool slopes, Kept* out) {
+inline void kept(const double* m, double log_reynolds, bool slopes, Kept* out) {
   for (int k = 0; k < 3; ++k) {
     for (int i = 0; i < 4; ++i) out->slope[k][i] = 0.0;
   }
@@ -187,7 +210,7 @@ inline void kept(const double* m, bool slopes, Kept* out) {
     return;
   }
   Features f;
-  features_of(m, &f);
+  features_of(m, log_reynolds, &f);
   const double g = gate(m[0], m[1]);
   double raw[{{ outputs }}];
 {% if kind == "mlp" %}
@@ -216,7 +239,7 @@ inline void kept(const double* m, bool slopes, Kept* out) {
 {% endif %}
     }
   }
-  const double spread = {{ spread_bound }} * logistic(raw[{{ values }}]);
+  const double spread = slopes ? 0.0 : {{ spread_bound }} * logistic(raw[{{ values }}]);
 {% else %}
   (void)slopes;  // constant between the cuts of a forest
   predictor(f.value, raw);
@@ -243,7 +266,7 @@ inline void predict({{ typed }}, double& kept_along, double& kept_across, double
   const double m[{{ n_markers }}] = {
       {{ markers|map(attribute="name")|join(", ") }}};
   detail::Kept k;
-  detail::kept(m, false, &k);
+  detail::kept(m, std::log(terminal_reynolds), false, &k);
   kept_along = k.along;
   kept_across = k.across;
   share = k.share;
@@ -260,6 +283,7 @@ struct Material {
   double weight;             // (rho_p - rho_g) g [N m-3]
   double terminal_velocity;  // [m s-1]
   double terminal_reynolds;  // [-]
+  double log_reynolds;       // its logarithm
   double terminal_drag;      // F of one settling particle [-]
   double length;             // L_c [m]
 };
@@ -300,6 +324,7 @@ inline Material material(double diameter, double particle_density, double gas_de
   }
   m.terminal_velocity = 0.5 * (low + high);
   m.terminal_reynolds = gas_density * m.terminal_velocity * diameter / gas_viscosity;
+  m.log_reynolds = std::log(m.terminal_reynolds);
   m.terminal_drag = stokes / m.terminal_velocity;
   m.length = diameter * std::cbrt(m.terminal_velocity * m.terminal_velocity / (g * diameter));
   return m;
@@ -326,15 +351,12 @@ inline bool eval_grad(const Material& m, double solid_fraction, const double* sl
   }
 {% if pressure %}
   double fall[3];
-  double fall_up = 0.0;
-  for (int i = 0; i < 3; ++i) {
-    fall[i] = -pressure_gradient[i] - m.gas_weight * m.up[i];
-    fall_up += fall[i] * m.up[i];
-  }
+  for (int i = 0; i < 3; ++i) fall[i] = -pressure_gradient[i] - m.gas_weight * m.up[i];
 {% else %}
   (void)pressure_gradient;
 {% endif %}
 {% if gradient %}
+  const double fall_up = fall[0] * m.up[0] + fall[1] * m.up[1] + fall[2] * m.up[2];
   double fall_across[3];
   double work = 0.0;
   for (int i = 0; i < 3; ++i) {
@@ -349,26 +371,31 @@ inline bool eval_grad(const Material& m, double solid_fraction, const double* sl
 {% endif %}
                            parcels};
   detail::Kept kept;
-  detail::kept(marker, derivative != nullptr, &kept);
+  detail::kept(marker, m.log_reynolds, derivative != nullptr, &kept);
   const double beta = 18.0 * m.gas_viscosity * (1.0 - solid_fraction) * solid_fraction * drag /
                       (m.diameter * m.diameter);
   const double up_part = beta * kept.along;
   const double across_part = beta * kept.across;
   for (int i = 0; i < 3; ++i) force[i] = up_part * s_up * m.up[i] + across_part * lateral[i];
+  double change[{{ 3 if outputs == 4 else 2 }}][3];  // of ln H along and across{{ ", and of the share" if outputs == 4 }}
   if (derivative != nullptr) {
     const double relative = steep / (drag * (speed2 > 1e-300 ? speed2 : 1e-300));
-    for (int j = 0; j < 3; ++j) {
-      const double of_beta = relative * slip[j];
-      // Derivatives of the four numbers of the slip.
-      const double d[4] = {m.up[j] / u_t, 2.0 * lateral[j] / (u_t * u_t),
-                           {{ "fall_across[j] / (m.weight * u_t)" if gradient else "0.0" }},
-                           drag / m.terminal_drag * of_beta};
-      double along = of_beta;
-      double across = of_beta;
-      for (int k = 0; k < 4; ++k) {
-        along += kept.slope[0][k] * d[k];
-        across += kept.slope[1][k] * d[k];
+    const double of_up = 1.0 / u_t;
+    const double of_lateral = 2.0 * of_up * of_up;
+{% if gradient %}
+    const double of_fall = of_up / m.weight;
+{% endif %}
+    const double of_ratio = drag / m.terminal_drag * relative;
+    for (int k = 0; k < {{ 3 if outputs == 4 else 2 }}; ++k) {
+      const double* const s = kept.slope[k];
+      for (int j = 0; j < 3; ++j) {
+        change[k][j] = s[0] * of_up * m.up[j] + s[1] * of_lateral * lateral[j]{{ " + s[2] * of_fall * fall_across[j]" if gradient }} +
+                       s[3] * of_ratio * slip[j];
       }
+    }
+    for (int j = 0; j < 3; ++j) {
+      const double along = relative * slip[j] + change[0][j];
+      const double across = relative * slip[j] + change[1][j];
       for (int i = 0; i < 3; ++i) {
         const double outer = m.up[i] * m.up[j];
         derivative[3 * i + j] = up_part * (outer + s_up * m.up[i] * along) +
@@ -380,12 +407,12 @@ inline bool eval_grad(const Material& m, double solid_fraction, const double* sl
   // The share of the gradient's force fades before it could drive the gas: see force.py.
   const double whole = kept.share;
   double pull[3];
-  double work = 0.0;
+  double done = 0.0;
   double against = 0.0;
   double pull2 = 0.0;
   for (int i = 0; i < 3; ++i) {
     pull[i] = (1.0 - solid_fraction) * fall[i];
-    work += force[i] * slip[i];
+    done += force[i] * slip[i];
     against += pull[i] * slip[i];
     pull2 += pull[i] * pull[i];
   }
@@ -393,24 +420,20 @@ inline bool eval_grad(const Material& m, double solid_fraction, const double* sl
   const double root = std::sqrt(against * against + small2);
   const double sum = root > 0.0 ? root + (against < 0.0 ? -against : against) : 1.0;
   const double n = against < 0.0 ? 0.5 * sum : 0.5 * small2 / sum;
-  const double below = work + whole * n;
+  const double below = done + whole * n;
   const double safe = below > 0.0 ? below : 1.0;
-  const double share = whole * work / safe;
+  const double share = whole * done / safe;
   if (derivative != nullptr) {
-    const double of_whole = work / safe * (work / safe);
-    const double of_work = whole * whole * n / (safe * safe);
-    const double of_n = -whole * whole * work / (safe * safe) * 0.5 *
-                        (against / (root > 0.0 ? root : 1.0) - 1.0);
+    const double part = 1.0 / safe;
+    const double of_whole = done * part * (done * part);
+    const double both = whole * part * (whole * part);
+    const double of_work = both * n;
+    const double of_n = -both * done * 0.5 * (against / (root > 0.0 ? root : 1.0) - 1.0);
     double of_share[3];
     for (int j = 0; j < 3; ++j) {
-      const double relative = steep / (drag * (speed2 > 1e-300 ? speed2 : 1e-300)) * slip[j];
-      const double d[4] = {m.up[j] / u_t, 2.0 * lateral[j] / (u_t * u_t), 0.0,
-                           drag / m.terminal_drag * relative};
-      double whole_slope = 0.0;
-      for (int k = 0; k < 4; ++k) whole_slope += kept.slope[2][k] * d[k];
       double work_slope = force[j];
       for (int i = 0; i < 3; ++i) work_slope += derivative[3 * i + j] * slip[i];
-      of_share[j] = of_whole * whole_slope + of_work * work_slope + of_n * pull[j];
+      of_share[j] = of_whole * change[2][j] + of_work * work_slope + of_n * pull[j];
     }
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) {
@@ -438,7 +461,8 @@ inline int self_test() {
   int failing = detail::intact() ? 0 : 1;
   for (int row = 0; row < {{ rows }}; ++row) {
     detail::Kept k;
-    detail::kept(detail::golden_markers() + {{ n_markers }} * row, false, &k);
+    const double* const m = detail::golden_markers() + {{ n_markers }} * row;
+    detail::kept(m, std::log(m[2]), false, &k);
     const double* const wanted = detail::golden_answers() + 4 * row;
     const bool sound = detail::close(k.along, wanted[0]) && detail::close(k.across, wanted[1]) &&
                        detail::close(k.share, wanted[2]) && detail::close(k.stderr_, wanted[3]);

@@ -1,7 +1,6 @@
 {# A network with all sums in registers, and the derivatives of its values. #}
-{% include "vectors.hpp" %}
-/// Network: values and spread before their bounds; unless slope is null, slope[4 k + i] is the
-/// derivative of value k with respect to feature 4 + i, the ones that the slip moves.
+/// Network: values and spread before their bounds. With slope, slope[4 k + i] is the derivative of
+/// value k with respect to feature 4 + i, the ones that the slip moves, and the spread is left out.
 inline void network(const double* features, double* raw, double* slope) {
   const v4 zero = {};
   v4 w;
@@ -35,7 +34,8 @@ inline void network(const double* features, double* raw, double* slope) {
 {% endfor %}
 {% set top = layers|length - 1 %}
 {% set wide = layers[top][0] %}
-  for (int k = 0; k < {{ outputs }}; ++k) {
+  const int rows = slope == nullptr ? {{ outputs }} : {{ outputs - 1 }};
+  for (int k = 0; k < rows; ++k) {
     v4 sum = zero;
 {% for b in range(wide // 4) %}
     load(last() + {{ wide }} * k + {{ 4 * b }}, w);

@@ -3,7 +3,8 @@
 ``plain`` needs the flow only. ``gradient`` adds what the pressure gradient says: of gas that is
 hardly accelerated the drag on the particles in a volume is about -eps (grad p - rho_g g), so the
 kept fraction is about q, that force over the drag without a correction. ``linear`` has the plain
-markers, and the force of the gradient itself beside the corrected drag.
+markers, and a share of the force of the gradient itself beside the corrected drag. ``full`` has
+both.
 
 Features are smooth in the slip, also where it is 0, and bounded in it or logarithmic.
 """
@@ -60,19 +61,27 @@ class DragMarkerSet:
     Attributes
     ----------
     name : str
-        ``plain``, ``gradient`` or ``linear``.
+        ``plain``, ``gradient``, ``linear`` or ``full``.
     markers : tuple of Marker
         The last one, ``parcels``, may be left out.
     feature_names : tuple of str
         Of what the predictor sees.
-    pressure : bool
-        Whether the force needs the pressure gradient.
+    marked : bool
+        Whether the predictor sees the pressure gradient.
+    linear : bool
+        Whether a share of the gradient's force stands beside the drag.
     """
 
     name: str
     markers: tuple[Marker, ...]
     feature_names: tuple[str, ...]
-    pressure: bool
+    marked: bool
+    linear: bool
+
+    @property
+    def pressure(self) -> bool:
+        """Whether the force needs the pressure gradient."""
+        return self.marked or self.linear
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -82,7 +91,7 @@ class DragMarkerSet:
     @property
     def outputs(self) -> int:
         """Numbers of the predictor: one for each direction, the share, the spread."""
-        return 4 if self.name == "linear" else 3
+        return 4 if self.linear else 3
 
     def features(self, m: dict[str, Array]) -> Array:
         """Features (n, n_features) of flat markers."""
@@ -105,7 +114,7 @@ class DragMarkerSet:
             Slope(4, SLIP_UP, bent_slope),
             Slope(5, SLIP_ACROSS2, 1.0 / (across2 + SMALL_ACROSS)),
         ]
-        if self.name == "gradient":
+        if self.marked:
             pull, work = m["gradient_up"], m["gradient_work"]
             scale = (phi + SMALL_FRACTION) * m["drag_ratio"]
             up2 = up * up + SMALL_SLIP2
@@ -155,13 +164,11 @@ _PLAIN_FEATURES = (
     "bent slip_up",
     f"log(slip_across^2 + {SMALL_ACROSS:g})",
 )
+_SEEN = (*_PLAIN, GRADIENT, WORK, DRAG, PARCELS)
+_SEEN_FEATURES = (*_PLAIN_FEATURES, "log of q up", "log of q across", "bent gradient_up")
 MARKER_SETS = {
-    "plain": DragMarkerSet("plain", (*_PLAIN, PARCELS), _PLAIN_FEATURES, False),
-    "gradient": DragMarkerSet(
-        "gradient",
-        (*_PLAIN, GRADIENT, WORK, DRAG, PARCELS),
-        (*_PLAIN_FEATURES, "log of q up", "log of q across", "bent gradient_up"),
-        True,
-    ),
-    "linear": DragMarkerSet("linear", (*_PLAIN, PARCELS), _PLAIN_FEATURES, True),
+    "plain": DragMarkerSet("plain", (*_PLAIN, PARCELS), _PLAIN_FEATURES, False, False),
+    "gradient": DragMarkerSet("gradient", _SEEN, _SEEN_FEATURES, True, False),
+    "linear": DragMarkerSet("linear", (*_PLAIN, PARCELS), _PLAIN_FEATURES, False, True),
+    "full": DragMarkerSet("full", _SEEN, _SEEN_FEATURES, True, True),
 }

@@ -177,7 +177,7 @@ def filtered_force(
         pull = (1.0 - phi)[:, None] * frame.fall
         share, of_share = _faded(
             prediction.share, change[2], (kept * s).sum(axis=1),
-            np.einsum("nij,ni->nj", derivative, s) + kept, pull, s, FADE * u_t,
+            np.einsum("nij,ni->nj", derivative, s) + kept, pull, s, u_t,
         )  # fmt: skip
         derivative = (1.0 - share)[:, None, None] * derivative + np.einsum(
             "ni,nj->nij", pull - kept, of_share
@@ -186,23 +186,33 @@ def filtered_force(
     return FilteredForce(kept, derivative, beta[:, None] * s, beta, share, prediction)
 
 
-def _faded(
-    whole: Array, of_whole: Array, work: Array, of_work: Array, pull: Array, s: Array, small: float
-) -> tuple[Array, Array]:
-    """The share that keeps F.s >= 0, and its derivative (n, 3)."""
-    against = (pull * s).sum(axis=1)
-    size2 = small**2 * (pull * pull).sum(axis=1)
+def _opposing(against: Array, size2: Array) -> tuple[Array, Array]:
+    """A smooth bound n of -against, and the root that it is made of."""
     root = np.sqrt(against**2 + size2)
     # The product of both roots is size2: no cancellation where the gradient's force drives.
-    sum_ = np.where(root > 0.0, root + np.abs(against), 1.0)
-    n = np.where(against < 0.0, 0.5 * sum_, 0.5 * size2 / sum_)
+    total = np.where(root > 0.0, root + np.abs(against), 1.0)
+    return np.where(against < 0.0, 0.5 * total, 0.5 * size2 / total), root
+
+
+def faded_share(whole: Array, work: Array, pull: Array, s: Array, u_t: float) -> Array:
+    """The share (n,) that keeps F.s >= 0, of work A (n,) and forces and slips (n, 3)."""
+    n, _ = _opposing((pull * s).sum(axis=1), (FADE * u_t) ** 2 * (pull * pull).sum(axis=1))
+    below = work + whole * n
+    return np.asarray(whole * work / np.where(below > 0.0, below, 1.0))
+
+
+def _faded(
+    whole: Array, of_whole: Array, work: Array, of_work: Array, pull: Array, s: Array, u_t: float
+) -> tuple[Array, Array]:
+    """The same share, and its derivative (n, 3)."""
+    against = (pull * s).sum(axis=1)
+    n, root = _opposing(against, (FADE * u_t) ** 2 * (pull * pull).sum(axis=1))
     below = work + whole * n
     safe = np.where(below > 0.0, below, 1.0)
-    share = whole * work / safe
     of_n = 0.5 * (against / np.where(root > 0.0, root, 1.0) - 1.0)[:, None] * pull
     of_share = (
         ((work / safe) ** 2)[:, None] * of_whole
         + (whole**2 * n / safe**2)[:, None] * of_work
         - (whole**2 * work / safe**2)[:, None] * of_n
     )
-    return share, of_share
+    return whole * work / safe, of_share

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 
 from greybed.closures.artifact import SUFFIX, load_drag
-from greybed.closures.drag.filtered.baselines import BASELINES, PublishedDrag, baseline
+from greybed.closures.drag.filtered.baselines import PublishedDrag, baseline
 from greybed.closures.drag.filtered.closure import FilteredDragClosure
 from greybed.closures.shipping import PREFIX, model_path
 
@@ -27,5 +27,4 @@ def kept_drag(name: str | os.PathLike[str]) -> FilteredDragClosure | PublishedDr
     if PREFIX in text or text.endswith(SUFFIX):
         return load_drag(model_path(text))
     # A case file turns relative paths into paths beside it; names of models are no paths.
-    stem = os.path.basename(text)
-    return baseline(stem if stem in BASELINES else text)
+    return baseline(os.path.basename(text))
