@@ -129,8 +129,8 @@ class TwoFluidCase:
             filter_ratio=self.filter_ratio,
         )  # fmt: skip
 
-    def solver(self) -> TwoFluid:
-        """The solver at the start."""
+    def solver(self, correction: FilteredDrag | None = None) -> TwoFluid:
+        """The solver at the start, with a correction of the drag that :meth:`filtered` made."""
         solids = self.solids
         made: dict[str, rims.Side] = {}
         for side in self.side:
@@ -151,7 +151,7 @@ class TwoFluidCase:
             ),
             gravity=self.gravity, sides=made, time_step=self.time_step, courant=self.courant,
             longest_step=self.longest_step, tolerance=self.tolerance,
-            correction=self.filtered(),
+            correction=correction,
         )  # fmt: skip
 
 
@@ -159,7 +159,8 @@ class TwoFluidRun:
     """A case that runs, a :class:`greybed.coupling.flow_run.Flow`."""
 
     def __init__(self, case: TwoFluidCase) -> None:
-        self.case, self.solver = case, case.solver()
+        self.case, self.filtered = case, case.filtered()
+        self.solver = case.solver(self.filtered)
         self.iterations = 0
 
     @property
@@ -212,7 +213,12 @@ class TwoFluidRun:
     def results(self) -> dict[str, Any]:
         """Plain numbers at the end."""
         means = self.solver.means
+        found: dict[str, Any] = {}
+        if self.filtered is not None and self.case.correction is not None:
+            found["drag_correction"] = self.case.correction.name
+            found["drag_correction_extrapolated"] = self.filtered.extrapolated
         return {
+            **found,
             "solids_mass_kg": self.solver.solids_mass,
             "mean_solid_fraction": means.solid_fraction,
             "mean_slip_m_per_s": list(means.slip),
