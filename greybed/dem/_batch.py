@@ -14,12 +14,17 @@ _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 @njit(**_OPTIONS)
 def room(table):
-    """An empty batch; with one pair of materials its numbers stand there for good."""
-    work = np.zeros((col.ROWS, col.SIZE))
+    """A batch before its first contact; with one pair of materials its numbers stay in there."""
+    work = np.empty((col.ROWS, col.SIZE))
     if table.shape[0] == 1:
         for column in range(col.COLUMNS):
             work[column, :] = table[0, column]
-    return work, np.empty(3 * col.SIZE, np.int64)
+    # What not every law fills in. To fill in all rows would take as long as many contacts.
+    for row in (col.INERTIA, col.AREA, col.HELD):
+        work[row, :] = 0.0
+    work[col.TX : col.DEEP + 1, :] = 0.0
+    work[col.RX : col.RZ + 1, :] = 0.0
+    return work
 
 
 @njit(**_OPTIONS)
@@ -176,8 +181,9 @@ def hertz(work, n):
         stiff = 2.0 * modulus[c] * width
         k_t[c] = 8.0 * shear[c] * width
         k_n[c] = stiff * (2.0 / 3.0)
-        force[c] = k_n[c] * overlap[c] - 2.0 * damping[c] * math.sqrt(stiff * m_eff[c]) * un[c]
-        viscous[c] = 2.0 * sideways[c] * math.sqrt(k_t[c] * m_eff[c])
+        root = 2.0 * math.sqrt(stiff * m_eff[c])
+        force[c] = k_n[c] * overlap[c] - damping[c] * root * un[c]
+        viscous[c] = sideways[c] * root
 
 
 @njit(**_OPTIONS)
@@ -206,9 +212,10 @@ def viscoelastic(work, n):
         k_t[c] = 8.0 * shear[c] * width
         k_n[c] = stiff * (2.0 / 3.0)
         # The force of Hertz is 2/3 S d, so 3/2 A k sqrt(d) is A times S.
-        drag = 2.0 * damping[c] * math.sqrt(stiff * m_eff[c]) + relaxation[c] * stiff
+        root = 2.0 * math.sqrt(stiff * m_eff[c])
+        drag = damping[c] * root + relaxation[c] * stiff
         force[c] = k_n[c] * overlap[c] - drag * un[c]
-        viscous[c] = 2.0 * sideways[c] * math.sqrt(k_t[c] * m_eff[c])
+        viscous[c] = sideways[c] * root
 
 
 @njit(**_OPTIONS)

@@ -92,10 +92,11 @@ def jkr(work, n, limit):
         stiff = 2.0 * modulus[c] * a
         k_n[c] = stiff * (2.0 / 3.0)
         k_t[c] = 8.0 * shear[c] * a
-        force[c] = elastic - 2.0 * damping[c] * math.sqrt(stiff * m_eff[c]) * un[c]
+        root = 2.0 * math.sqrt(stiff * m_eff[c])
+        force[c] = elastic - damping[c] * root * un[c]
         if limit:
             force[c] = max(force[c], min(elastic, 0.0))
-        viscous[c] = 2.0 * sideways[c] * math.sqrt(k_t[c] * m_eff[c])
+        viscous[c] = sideways[c] * root
         # Thornton: friction is that of the force plus twice the pull-off force.
         held[c] = 6.0 * math.pi * gamma[c] * r_eff[c]
 

@@ -96,15 +96,20 @@ def list_pairs(
                         continue
                     my = -1 if ay < 0 else 1
                     by = ay - my * shape[1]
-                for az in range(cz - 1, cz + 2):
-                    bz, mz = az, 0
-                    if az < 0 or az >= shape[2]:
-                        if not periodic[2]:
-                            continue
-                        mz = -1 if az < 0 else 1
-                        bz = az - mz * shape[2]
-                    other = (bx * shape[1] + by) * shape[2] + bz
-                    for m in range(start[other], start[other + 1]):
+                row = (bx * shape[1] + by) * shape[2]
+                # Cells along z are beside each other: one stretch of members, and what lies across
+                # a periodic face.
+                for part in range(3):
+                    mz = part - 1
+                    if mz == 0:
+                        low, high = max(cz - 1, 0), min(cz + 1, shape[2] - 1)
+                    elif periodic[2] and mz < 0 and cz == 0:
+                        low = high = shape[2] - 1
+                    elif periodic[2] and mz > 0 and cz == shape[2] - 1:
+                        low = high = 0
+                    else:
+                        continue
+                    for m in range(start[row + low], start[row + high + 1]):
                         j = member[m]
                         if j <= i:
                             continue

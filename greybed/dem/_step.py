@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
+from greybed.dem._batch import room
 from greybed.dem._pairs import block_forces
 from greybed.dem._rigid import kick_bodies
 from greybed.dem._walls import move, wall_forces
@@ -20,7 +21,8 @@ class State(NamedTuple):
 
     place: np.ndarray  # (n, 4): centre and radius [m]
     motion: np.ndarray  # (n, 8): velocity [m/s], spin [1/s], mass [kg], moment of inertia [kg m2]
-    load: np.ndarray  # (n, 8): force [N], torque [N m]; two spare, a line of the cache each
+    # (n, 8): force [N], torque [N m], inverses of mass and moment of inertia: the kick needs them
+    load: np.ndarray
     kind: np.ndarray  # (n,) int64, material
     listed: np.ndarray  # (n, 3): centre when the lists were made [m]
     fixed: np.ndarray  # (n,) bool: moves on as it does, whatever the force
@@ -33,6 +35,7 @@ class Near(NamedTuple):
     """Pairs and their histories."""
 
     first: np.ndarray  # (n + 1,) int64
+    owner: np.ndarray  # (m,) int32, the lower particle of each pair
     partner: np.ndarray  # (m,) int32
     shift: np.ndarray  # (m,) uint8, image of the partner
     touch: np.ndarray  # (m,) uint8, whether in contact
@@ -41,6 +44,7 @@ class Near(NamedTuple):
     crossing: np.ndarray  # (slots, 6): force and torque on particles of later blocks
     into: np.ndarray  # (n + 1,) int64
     slots: np.ndarray  # (slots,) int32, rows of ``crossing`` that act on each particle
+    onto: np.ndarray  # (slots,) int32, the particle that each of ``slots`` acts on
     block: np.ndarray  # (blocks + 1,) int64, first particle of each block
 
 
@@ -80,23 +84,22 @@ def _kick_and_drift(begin, end, state, near, push, dt, finish, start, worst):
     place, motion = state.place.reshape(-1), state.motion.reshape(-1)
     load, listed, fixed = state.load.reshape(-1), state.listed.reshape(-1), state.fixed
     body = state.body
-    into, slots, crossing = near.into, near.slots, near.crossing
+    into, slots, onto, crossing = near.into, near.slots, near.onto, near.crossing.reshape(-1)
     outer, pushed = state.outer.reshape(-1), state.outer.shape[0] > 0
     halves = finish + start
     half = 0.5 * dt
     gx, gy, gz = half * push[0], half * push[1], half * push[2]
     largest, who = 0.0, -1
+    if finish:
+        for k in range(into[begin], into[end]):
+            m, s = np.uint64(8 * onto[k]), np.uint64(6 * slots[k])
+            for c in range(6):
+                load[m + np.uint64(c)] += crossing[s + np.uint64(c)]
     for i in range(begin, end):
         p, m = np.uint64(4 * i), np.uint64(8 * i)
-        if finish:
-            for k in range(into[i], into[i + 1]):
-                for c in range(6):
-                    load[8 * i + c] += crossing[slots[k], c]
         vx, vy, vz = motion[m], motion[m + np.uint64(1)], motion[m + np.uint64(2)]
         if body[i] < 0 and not fixed[i]:
-            mass, inertia = motion[m + np.uint64(6)], motion[m + np.uint64(7)]
-            share = half / (mass * inertia)  # one division for both
-            kick, spin = share * inertia, share * mass
+            kick, spin = half * load[m + np.uint64(6)], half * load[m + np.uint64(7)]
             ax = kick * load[m] + gx
             ay = kick * load[m + np.uint64(1)] + gy
             az = kick * load[m + np.uint64(2)] + gz
@@ -155,13 +158,14 @@ def _kicks(state, near, rigid, push, edge, dt, finish, start, worst):
 
 
 @njit(**_OPTIONS)
-def _forces_of_block(b, state, near, surfaces, law, edge, periodic, dt, count):
+def _forces_of_block(b, state, near, surfaces, law, edge, periodic, dt, look, deepest):
     begin, end = near.block[b], near.block[b + 1]
+    work = room(law.table)
     block_forces(
         begin, end, state.place, state.motion, state.load, state.kind,
-        near.first, near.partner, near.shift, near.touch, near.history, near.slot, near.crossing,
-        edge, periodic, law.row, law.table, dt,
-        law.normal, law.rolling, law.cohesion, law.limit, count,
+        near.first, near.owner, near.partner, near.shift, near.touch, near.history, near.slot,
+        near.crossing, edge, periodic, law.row, law.table, dt,
+        law.normal, law.rolling, law.cohesion, law.limit, look, deepest, work,
     )  # fmt: skip
     if surfaces.kinds.size:
         surfaces.force[b, :, :] = 0.0
@@ -170,30 +174,34 @@ def _forces_of_block(b, state, near, surfaces, law, edge, periodic, dt, count):
             surfaces.first, surfaces.surface, surfaces.touch, surfaces.history,
             surfaces.kinds, surfaces.data, surfaces.wall, surfaces.motion, surfaces.kind,
             surfaces.force[b], law.row, law.table, dt,
-            law.normal, law.rolling, law.cohesion, law.limit,
+            law.normal, law.rolling, law.cohesion, law.limit, work,
         )  # fmt: skip
 
 
 @njit(parallel=True, **_OPTIONS)
-def _forces_of_blocks(state, near, surfaces, law, edge, periodic, dt, count):
+def _forces_of_blocks(state, near, surfaces, law, edge, periodic, dt, look, deepest):
     for b in prange(near.block.size - 1):
-        _forces_of_block(np.int64(b), state, near, surfaces, law, edge, periodic, dt, count[b])
+        _forces_of_block(
+            np.int64(b), state, near, surfaces, law, edge, periodic, dt, look, deepest[b]
+        )
 
 
 # Numbers with a type of their own, not literals: each literal would be compiled once more.
 @njit(**_OPTIONS)
-def forces(state, near, surfaces, law, edge, periodic, dt, count):
+def forces(state, near, surfaces, law, edge, periodic, dt, look, deepest):
     """Forces of the present places; those across blocks wait in ``near.crossing``."""
     if near.block.size == 2:
-        _forces_of_block(np.int64(0), state, near, surfaces, law, edge, periodic, dt, count[0])
+        _forces_of_block(
+            np.int64(0), state, near, surfaces, law, edge, periodic, dt, look, deepest[0]
+        )
     else:
-        _forces_of_blocks(state, near, surfaces, law, edge, periodic, dt, count)
+        _forces_of_blocks(state, near, surfaces, law, edge, periodic, dt, look, deepest)
 
 
 @njit(**_OPTIONS)
 def advance(
     steps, state, near, rigid, surfaces, law, edge, periodic, push, dt, skin, wall_pace, wall_way,
-    pending, worst, count,
+    pending, worst, deepest,
 ):  # fmt: skip
     """Up to ``steps`` steps; returns those done, why it ended, and the particle that was at fault.
 
@@ -217,7 +225,8 @@ def advance(
             return step, LOST, who, wall_way
         if 2.0 * np.sqrt(largest) > skin - wall_way:
             return step, RENEW, who, wall_way
-        forces(state, near, surfaces, law, edge, periodic, dt, count)
+        last = step == steps - 1
+        forces(state, near, surfaces, law, edge, periodic, dt, last, deepest)
     return steps, DONE, -1, wall_way
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from greybed.dem import _columns as col
-from greybed.dem._batch import room, solve
+from greybed.dem._batch import solve
 from greybed.dem._cohesion import attraction, bridge, neck
 from greybed.dem._surfaces import FACE, PLANE, TRIANGLE, nearest
 
@@ -62,10 +62,20 @@ def _carry(m, dt, vector, point):
 def list_near(place, kinds, data, skin, first, surface):
     """Surfaces nearer than ``skin`` to each particle, as :func:`list_pairs` does for pairs."""
     count = 0
+    flat = data.reshape(-1)
     for i in range(place.shape[0]):
         first[i] = count
         x, y, z, r = place[i, 0], place[i, 1], place[i, 2], place[i, 3]
         for s in range(kinds.size):
+            if kinds[s] == PLANE:
+                b = 13 * s
+                distance = (x - flat[b]) * flat[b + 3] + (y - flat[b + 1]) * flat[b + 4]
+                distance += (z - flat[b + 2]) * flat[b + 5]
+                if distance < r + skin:
+                    if count < surface.size:
+                        surface[count] = s
+                    count += 1
+                continue
             # A bounding ball first, for meshes have many triangles.
             bx, by, bz = x - data[s, 10], y - data[s, 11], z - data[s, 12]
             ball = data[s, 9] + r + skin
@@ -102,25 +112,29 @@ def carry_over_walls(
 def wall_forces(
     begin, end, place, motion, load, kind, first, surface, touch, history,
     kinds, data, wall, wall_motion, wall_kind, on_wall, row, table, dt,
-    normal, rolling, cohesion, limit,
+    normal, rolling, cohesion, limit, work,
 ):  # fmt: skip
     """Forces of surfaces on particles ``begin`` to ``end - 1``; ``on_wall`` collects the sums.
 
     A wall is one surface or a mesh of them. Where a particle touches several triangles of a mesh,
     faces count first; a rim counts where it is not part of such a face and not met before.
     """
-    work, who = room(table)
+    who = np.empty(3 * col.SIZE, np.int64)
     one = table.shape[0] == 1
-    # Flat: a slice of a row counts references, which takes longer than a plane's distance.
-    flat, moves = data.reshape(-1), wall_motion.reshape(-1)
+    # Flat: a slice of a row counts references, which takes longer than a plane's distance, and
+    # numba multiplies by strides at each access of two indices.
+    flat, moves, rows = data.reshape(-1), wall_motion.reshape(-1), work.reshape(-1)
+    at, motions, springs = place.reshape(-1), motion.reshape(-1), history.reshape(-1)
+    columns = history.shape[1]
     filled = np.int64(0)
     seen = np.empty((MOST_AT_ONCE, 7))
     met = np.empty(MOST_AT_ONCE, np.int64)
     for i in range(begin, end):
         if first[i] == first[i + 1]:
             continue
-        x, y, z, r = place[i, 0], place[i, 1], place[i, 2], place[i, 3]
-        mass = motion[i, 6]
+        q, v = np.uint64(4 * i), np.uint64(8 * i)
+        x, y, z, r = at[q], at[q + np.uint64(1)], at[q + np.uint64(2)], at[q + np.uint64(3)]
+        mass = motions[v + np.uint64(6)]
         number, turns = 0, 1
         for turn in range(2):
             if turn == turns:
@@ -180,75 +194,81 @@ def wall_forces(
                     seen[number, 6] = where
                     number += 1
                 m = 9 * w
-                c = filled
-                who[c], who[c + col.SIZE], who[c + 2 * col.SIZE] = i, w, k
-                work[col.NX, c], work[col.NY, c], work[col.NZ, c], work[col.OVERLAP, c] = (
-                    nx,
-                    ny,
-                    nz,
-                    overlap,
-                )
+                c = np.uint64(filled)
+                who[c], who[c + np.uint64(col.SIZE)] = i, w
+                who[c + np.uint64(2 * col.SIZE)] = k
+                rows[np.uint64(col.NX * col.SIZE) + c] = nx
+                rows[np.uint64(col.NY * col.SIZE) + c] = ny
+                rows[np.uint64(col.NZ * col.SIZE) + c] = nz
+                rows[np.uint64(col.OVERLAP * col.SIZE) + c] = overlap
                 # Velocity relative to the wall at the contact.
                 lx, ly, lz = qx - moves[m + 6], qy - moves[m + 7], qz - moves[m + 8]
-                work[col.UX, c] = motion[i, 0] - (moves[m] + moves[m + 4] * lz - moves[m + 5] * ly)
-                work[col.UY, c] = motion[i, 1] - (
-                    moves[m + 1] + moves[m + 5] * lx - moves[m + 3] * lz
-                )
-                work[col.UZ, c] = motion[i, 2] - (
-                    moves[m + 2] + moves[m + 3] * ly - moves[m + 4] * lx
-                )
-                work[col.IX, c], work[col.IY, c], work[col.IZ, c] = (
-                    motion[i, 3],
-                    motion[i, 4],
-                    motion[i, 5],
-                )
-                work[col.JX, c], work[col.JY, c], work[col.JZ, c] = (
-                    moves[m + 3],
-                    moves[m + 4],
-                    moves[m + 5],
-                )
-                work[col.R_EFF, c], work[col.M_EFF, c], work[col.INERTIA, c] = r, mass, mass * r * r
-                work[col.ARM_I, c], work[col.ARM_J, c] = r - 0.5 * overlap, 0.0
-                work[col.AREA, c] = math.pi * (r * r - distance * distance)
-                for column in range(history.shape[1]):
-                    work[col.SX + column, c] = history[k, column]
+                wx, wy, wz = moves[m + 3], moves[m + 4], moves[m + 5]
+                ux = motions[v] - (moves[m] + wy * lz - wz * ly)
+                uy = motions[v + np.uint64(1)] - (moves[m + 1] + wz * lx - wx * lz)
+                uz = motions[v + np.uint64(2)] - (moves[m + 2] + wx * ly - wy * lx)
+                rows[np.uint64(col.UX * col.SIZE) + c] = ux
+                rows[np.uint64(col.UY * col.SIZE) + c] = uy
+                rows[np.uint64(col.UZ * col.SIZE) + c] = uz
+                rows[np.uint64(col.IX * col.SIZE) + c] = motions[v + np.uint64(3)]
+                rows[np.uint64(col.IY * col.SIZE) + c] = motions[v + np.uint64(4)]
+                rows[np.uint64(col.IZ * col.SIZE) + c] = motions[v + np.uint64(5)]
+                rows[np.uint64(col.JX * col.SIZE) + c] = wx
+                rows[np.uint64(col.JY * col.SIZE) + c] = wy
+                rows[np.uint64(col.JZ * col.SIZE) + c] = wz
+                rows[np.uint64(col.R_EFF * col.SIZE) + c] = r
+                rows[np.uint64(col.M_EFF * col.SIZE) + c] = mass
+                rows[np.uint64(col.INERTIA * col.SIZE) + c] = mass * r * r
+                rows[np.uint64(col.ARM_I * col.SIZE) + c] = r - 0.5 * overlap
+                rows[np.uint64(col.ARM_J * col.SIZE) + c] = 0.0
+                rows[np.uint64(col.AREA * col.SIZE) + c] = math.pi * (r * r - distance * distance)
+                for column in range(columns):
+                    rows[(col.SX + column) * col.SIZE + filled] = springs[columns * k + column]
                 if not one:
                     for column in range(col.COLUMNS):
-                        work[column, c] = table[p, column]
+                        rows[column * col.SIZE + filled] = table[p, column]
                 filled += 1
                 if filled == col.SIZE:
                     solve(work, filled, dt, normal, rolling, cohesion, limit)
-                    _carry_out(
-                        work, who, filled, place, load, history, wall_motion, rolling, on_wall
-                    )
+                    _carry_out(rows, who, filled, at, load.reshape(-1), springs, columns, moves,
+                               rolling, on_wall)  # fmt: skip
                     filled = np.int64(0)
     if filled:
         solve(work, filled, dt, normal, rolling, cohesion, limit)
-        _carry_out(work, who, filled, place, load, history, wall_motion, rolling, on_wall)
+        _carry_out(rows, who, filled, at, load.reshape(-1), springs, columns, moves, rolling,
+                   on_wall)  # fmt: skip
 
 
 @njit(**_OPTIONS)
-def _carry_out(work, who, n, place, load, history, wall_motion, rolling, on_wall):
+def _carry_out(work, who, n, place, load, history, columns, wall_motion, rolling, on_wall):
     """Forces of a batch, on particles and walls."""
     for c in range(n):
         i, w, k = who[c], who[c + col.SIZE], who[c + 2 * col.SIZE]
-        for column in range(history.shape[1]):
-            history[k, column] = work[col.SX + column, c]
-        fx, fy, fz = work[col.FX, c], work[col.FY, c], work[col.FZ, c]
+        for column in range(columns):
+            history[columns * k + column] = work[(col.SX + column) * col.SIZE + c]
+        p, m, v, c = np.uint64(4 * i), np.uint64(8 * i), np.uint64(9 * w), np.uint64(c)
+        fx = work[np.uint64(col.FX * col.SIZE) + c]
+        fy = work[np.uint64(col.FY * col.SIZE) + c]
+        fz = work[np.uint64(col.FZ * col.SIZE) + c]
         tx, ty, tz = 0.0, 0.0, 0.0
         if rolling != col.NO_ROLLING:
-            tx, ty, tz = work[col.RX, c], work[col.RY, c], work[col.RZ, c]
-        arm = work[col.ARM_I, c]
-        load[i, 0] += fx
-        load[i, 1] += fy
-        load[i, 2] += fz
-        load[i, 3] -= arm * work[col.BX, c] + tx
-        load[i, 4] -= arm * work[col.BY, c] + ty
-        load[i, 5] -= arm * work[col.BZ, c] + tz
-        away = place[i, 3] - work[col.OVERLAP, c]
-        lx = place[i, 0] - away * work[col.NX, c] - wall_motion[w, 6]
-        ly = place[i, 1] - away * work[col.NY, c] - wall_motion[w, 7]
-        lz = place[i, 2] - away * work[col.NZ, c] - wall_motion[w, 8]
+            tx = work[np.uint64(col.RX * col.SIZE) + c]
+            ty = work[np.uint64(col.RY * col.SIZE) + c]
+            tz = work[np.uint64(col.RZ * col.SIZE) + c]
+        arm = work[np.uint64(col.ARM_I * col.SIZE) + c]
+        load[m] += fx
+        load[m + np.uint64(1)] += fy
+        load[m + np.uint64(2)] += fz
+        load[m + np.uint64(3)] -= arm * work[np.uint64(col.BX * col.SIZE) + c] + tx
+        load[m + np.uint64(4)] -= arm * work[np.uint64(col.BY * col.SIZE) + c] + ty
+        load[m + np.uint64(5)] -= arm * work[np.uint64(col.BZ * col.SIZE) + c] + tz
+        away = place[p + np.uint64(3)] - work[np.uint64(col.OVERLAP * col.SIZE) + c]
+        lx = place[p] - away * work[np.uint64(col.NX * col.SIZE) + c]
+        ly = place[p + np.uint64(1)] - away * work[np.uint64(col.NY * col.SIZE) + c]
+        lz = place[p + np.uint64(2)] - away * work[np.uint64(col.NZ * col.SIZE) + c]
+        lx -= wall_motion[v + np.uint64(6)]
+        ly -= wall_motion[v + np.uint64(7)]
+        lz -= wall_motion[v + np.uint64(8)]
         on_wall[w, 0] -= fx
         on_wall[w, 1] -= fy
         on_wall[w, 2] -= fz

@@ -19,7 +19,7 @@ from greybed.dem._rigid import Rigid
 from greybed.dem.lists import Lists
 from greybed.dem.simulation import Simulation
 
-FORMAT = "greybed-particles-3"
+FORMAT = "greybed-particles-4"
 
 
 def save(
@@ -64,13 +64,14 @@ def save(
         "next": simulation._next,
         "wall_way": lists.wall_way,
         "skin": lists.skin,
+        "listed_at": lists.listed_at,
         "extra": extra,
     }
     with atomic_path(path) as part, open(part, "wb") as stream:
         np.savez(
             stream, allow_pickle=False, ident=lists.ident, body_ident=lists.body_ident,
-            labels=simulation.labels,
-            worst=lists.worst, count=lists.count, numbers=np.array(json.dumps(numbers)), **arrays,
+            labels=simulation.labels, worst=lists.worst, deepest=lists.deepest,
+            numbers=np.array(json.dumps(numbers)), **arrays,
         )  # fmt: skip
     return Path(path)
 
@@ -122,8 +123,9 @@ def restore(simulation: Simulation, path: str | os.PathLike[str]) -> dict[str, A
     lists: Lists = simulation._lists
     lists.state, lists.near, lists.surfaces = groups["state"], groups["near"], groups["surfaces"]
     lists.rigid, lists.body_ident = groups["rigid"], arrays["body_ident"]
-    lists.ident, lists.worst, lists.count = arrays["ident"], arrays["worst"], arrays["count"]
+    lists.ident, lists.worst, lists.deepest = arrays["ident"], arrays["worst"], arrays["deepest"]
     lists.wall_way, lists.skin = float(numbers["wall_way"]), float(numbers["skin"])
+    lists.listed_at = int(numbers["listed_at"])
     lists.wall_pace = lists.pace()
     simulation._state = lists.state
     simulation.labels = arrays["labels"]

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from greybed.core.errors import InputError
 from greybed.dem import _neighbours, _rigid, _step, _surfaces, _walls
 from greybed.dem.bodies import chosen_bodies, joined_bodies, joined_states, sorted_bodies
+from greybed.dem.skin import AT_START, best_skin
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -37,6 +38,10 @@ class Lists:
         Bodies; their spheres are numbered as in ``state``.
     skin, reach : float
         Gap up to which pairs are listed, and up to which they attract each other [m].
+    radius : float or None
+        Mean radius, by which the skin follows the speed of the particles [m]; None if it is given.
+    listed_at : int
+        Step at which the lists were made.
     wall_pace, wall_way : float
         Highest speed of a wall's surface [m/s] and its way since the lists were made [m].
     """
@@ -50,10 +55,13 @@ class Lists:
         columns: int,
         box: ArrayLike | None,
         periodic: tuple[bool, bool, bool],
-        skin: float,
+        skin: float | None,
         reach: float,
     ) -> None:
         n = len(state.place)
+        radius = float(state.place[:, 3].mean())
+        self.radius = radius if skin is None else None
+        skin = reach + (AT_START * radius if skin is None else skin)
         self.state, self.rigid = state, rigid
         self.ident, self.body_ident = np.arange(n), np.arange(len(rigid.pose))
         self.skin, self.reach, self.columns = skin, reach, columns
@@ -66,8 +74,8 @@ class Lists:
             raise InputError(f"skin = {skin - reach:g} [m] must be above 0.")
         none = np.zeros(0, np.int64)
         self.near = _step.Near(
-            np.zeros(n + 1, np.int64), *_pairs(0, columns), np.zeros((0, 6)),
-            np.zeros(n + 1, np.int64), np.zeros(0, np.int32), none,
+            np.zeros(n + 1, np.int64), np.zeros(0, np.int32), *_pairs(0, columns), np.zeros((0, 6)),
+            np.zeros(n + 1, np.int64), np.zeros(0, np.int32), np.zeros(0, np.int32), none,
         )  # fmt: skip
         kinds, data, wall, motion = walls
         self.surfaces = _step.Surfaces(
@@ -76,7 +84,7 @@ class Lists:
             np.zeros((0, len(motion), 6)),
         )  # fmt: skip
         self._lay_blocks(n)
-        self.wall_way = 0.0
+        self.listed_at, self.wall_way = 0, 0.0
         self.wall_pace = self.pace()
 
     def _lay_blocks(self, n: int) -> None:
@@ -89,9 +97,9 @@ class Lists:
             force=np.zeros((blocks, len(self.surfaces.motion), 6))
         )
         self.worst = np.zeros((blocks, 2))
-        self.count = np.zeros((blocks, 3))
+        self.deepest = np.zeros((blocks, 2))
 
-    def extend(self, more: _step.State, bodies: _rigid.Rigid) -> None:
+    def extend(self, step: int, more: _step.State, bodies: _rigid.Rigid) -> None:
         """Take in particles that touch nothing, numbered after those that are there."""
         m = len(more.place)
         self.ident = np.concatenate([self.ident, np.arange(m) + len(self.ident)])
@@ -109,9 +117,9 @@ class Lists:
         self.surfaces = surfaces._replace(
             first=np.concatenate([surfaces.first, np.full(m, surfaces.first[-1])])
         )
-        self.renew(np.ones(len(self.ident), dtype=bool))
+        self.renew(step, np.ones(len(self.ident), dtype=bool))
 
-    def drop_wall(self, wall: int) -> None:
+    def drop_wall(self, step: int, wall: int) -> None:
         """Forget the surfaces of a wall; the others keep their numbers."""
         s = self.surfaces
         stays = s.wall != wall
@@ -122,7 +130,7 @@ class Lists:
             kinds=s.kinds[stays], data=s.data[stays], wall=s.wall[stays], surface=surface
         )
         self.wall_pace = self.pace()
-        self.renew()
+        self.renew(step)
 
     def _checked_box(self, box: ArrayLike | None) -> Array:
         if box is None:
@@ -162,8 +170,22 @@ class Lists:
             pace = max(pace, float(np.linalg.norm(m[:3])) + (0.0 if turned else spin * far))
         return pace
 
-    def renew(self, keep: NDArray[np.bool_] | None = None) -> None:
-        """Sort the particles by place and list anew who is near whom.
+    def fitting_skin(self, step: int) -> float:
+        """The skin that the speed of the particles calls for at a step [m].
+
+        At most twice the present one, or half of it: one fast particle says little of the others.
+        """
+        if self.radius is None:
+            return self.skin
+        way = 2.0 * math.sqrt(float(self.worst[:, 0].max())) + self.wall_way
+        best = best_skin(way / max(step - self.listed_at, 1), self.radius)
+        now = self.skin - self.reach
+        # Across periodic faces pairs reach one cell far: three cells must find room.
+        rooms = self.edge[self.periodic] / 3.0 - 2.0 * float(self.state.place[:, 3].max())
+        return self.reach + min(max(best, 0.5 * now), 2.0 * now, *(rooms - self.reach).tolist())
+
+    def renew(self, step: int, keep: NDArray[np.bool_] | None = None) -> None:
+        """Sort the particles by place and list anew who is near whom, at a step.
 
         ``keep`` says which of them stay, in their present order; all by default. The loads stay,
         too: what touched a particle that goes gets half a kick from it yet.
@@ -193,11 +215,13 @@ class Lists:
             old.fixed[order], old.body[order],
             old.outer[order] if len(old.outer) else old.outer,
         )  # fmt: skip
+        # Not only where they are made: particles come from several doors.
+        self.state.load[:, 6:] = 1.0 / self.state.motion[:, 6:]
         if len(self.rigid.pose):
             self._renew_bodies(order, len(old.place))
         self._renew_pairs(near, order, cell, shape)
         self._renew_surfaces(order)
-        self.wall_way = 0.0
+        self.listed_at, self.wall_way = step, 0.0
 
     def _renew_bodies(self, order: Index, before: int) -> None:
         """Spheres of the bodies where they are now; bodies without spheres are gone."""
@@ -257,9 +281,11 @@ class Lists:
         )  # fmt: skip
         into, slots = np.empty(n + 1, np.int64), np.empty(found, np.int32)
         crossings = _neighbours.list_crossings(near.block, first, partner, slot, into, slots)
+        owner = np.repeat(np.arange(n, dtype=np.int32), np.diff(first))
         self.near = _step.Near(
-            first, partner, shift, touch, history, slot, np.zeros((crossings, 6)), into,
-            slots[:crossings].copy(), near.block,
+            first, owner, partner, shift, touch, history, slot, np.zeros((crossings, 6)), into,
+            slots[:crossings].copy(),
+            np.repeat(np.arange(n, dtype=np.int32), np.diff(into)), near.block,
         )  # fmt: skip
 
     def _renew_surfaces(self, order: Index) -> None:
@@ -290,13 +316,13 @@ class Lists:
     def pairs(self, chosen: NDArray[np.bool_]) -> Index:
         """Listed pairs that are chosen, (m, 2), in numbers of the input."""
         at = np.flatnonzero(chosen)
-        low = np.searchsorted(self.near.first, at, side="right") - 1
+        low = self.near.owner[at]
         return np.stack([self.ident[low], self.ident[self.near.partner[at]]], axis=1)
 
     def touching(self) -> Index:
         """Pairs whose surfaces overlap now, (m, 2), whether or not their forces are known."""
         near, place = self.near, self.state.place
-        low = np.repeat(np.arange(len(place)), np.diff(near.first))
+        low = near.owner
         shift = near.shift.astype(np.int64)
         images = np.stack([shift // 9, shift // 3 % 3, shift % 3], axis=1) - 1
         away = place[near.partner, :3] + images * self.edge - place[low, :3]

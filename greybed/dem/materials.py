@@ -242,7 +242,10 @@ def _row(a: Material, b: Material, contact: Contact, law: ContactLaw, *, of_wall
         shape = "hertz" if law.from_moduli else "linear"
         row[_columns.DAMPING] = damping(e, shape, limit_force=law.limit_force)
         if law.tangential_damping:
+            # Of Hertz's laws over the normal root of stiffness and mass, which they have already.
+            roots = math.sqrt(4.0 * row[_columns.SHEAR] / row[_columns.MODULUS])
             row[_columns.TANGENTIAL_DAMPING] = row[_columns.DAMPING]
+            row[_columns.TANGENTIAL_DAMPING] *= roots if law.from_moduli else 1.0
     row[_columns.UNLOADING] = 1.0 / e**2
     if law.normal == "viscoelastic":
         slow = contact.slow_restitution

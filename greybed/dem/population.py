@@ -98,7 +98,7 @@ class Population(Views):
                 f"time {shortest:.3g} [s] of the particles to be inserted; take a smaller one."
             )
         n, m = len(self._state.place), len(place)
-        self._lists.extend(more, bodies)
+        self._lists.extend(self.steps, more, bodies)
         self._state = self._lists.state
         self.labels = np.concatenate([self.labels, self._next + np.arange(m)])
         self._next += m
@@ -144,7 +144,7 @@ class Population(Views):
                     "spheres of a body away; the spheres of a body stay or go together."
                 )
         if gone.any():
-            self._lists.renew(~gone[self._lists.ident])
+            self._lists.renew(self.steps, ~gone[self._lists.ident])
             self._state = self._lists.state
             self.labels = self.labels[~gone]
 
@@ -170,7 +170,7 @@ class Population(Views):
         InputError
             If no wall has this name.
         """
-        self._lists.drop_wall(self._wall(name))
+        self._lists.drop_wall(self.steps, self._wall(name))
         self._state = self._lists.state
 
     def _wall(self, name: str) -> int:

@@ -18,6 +18,7 @@ from greybed.dem.lists import Lists
 from greybed.dem.materials import Contact, Material, pair_tables
 from greybed.dem.particles import particle_arrays, rayleigh_time
 from greybed.dem.population import MOST_OF_RAYLEIGH, Population
+from greybed.dem.skin import LOOK, TOO_WIDE
 from greybed.dem.walls import SolidWall, surfaces_of
 
 Array = NDArray[np.float64]
@@ -60,7 +61,7 @@ class Simulation(Population):
     clumps : sequence of Clumps
         Rigid bodies. Their spheres are numbered after the others, of which there may be none then.
     skin : float, optional
-        Pairs nearer than it are listed [m]; a quarter of the mean radius by default.
+        Pairs nearer than it are listed [m]; by default it follows the speed of the particles.
     most_overlap : float
         Overlap over the smaller radius at which a run stops [-].
     threads : int, optional
@@ -144,7 +145,7 @@ class Simulation(Population):
             self.law.columns,
             box,
             periodic,
-            (0.25 * float(place[:, 3].mean()) if skin is None else float(skin)) + reach,
+            None if skin is None else float(skin),
             reach,
         )
         most = int(numba.config.NUMBA_NUM_THREADS)
@@ -155,7 +156,7 @@ class Simulation(Population):
         self.labels = np.arange(n)
         self._next = n
         self._pending = False
-        self._lists.renew()
+        self._lists.renew(0)
         self._state = self._lists.state
         # No time has passed yet: a spring stretched now would count its first step twice.
         self._forces(0.0)
@@ -187,10 +188,14 @@ class Simulation(Population):
     def _run(self, left: int) -> None:
         lists = self._lists
         while left:
+            # At steps that a run in two parts meets, too: when lists are made decides the order of
+            # the sums.
+            before_look = LOOK - self.steps % LOOK
             done, why, who, lists.wall_way = _step.advance(
-                left, self._state, lists.near, lists.rigid, lists.surfaces, self._law, lists.edge,
-                lists.wraps, self.gravity, self.time_step, lists.skin - lists.reach,
-                lists.wall_pace, lists.wall_way, self._pending, lists.worst, lists.count,
+                min(left, before_look), self._state, lists.near, lists.rigid, lists.surfaces,
+                self._law, lists.edge, lists.wraps, self.gravity, self.time_step,
+                lists.skin - lists.reach, lists.wall_pace, lists.wall_way, self._pending,
+                lists.worst, lists.deepest,
             )  # fmt: skip
             self.steps += done
             left -= done
@@ -200,13 +205,16 @@ class Simulation(Population):
             if why == _step.RENEW:
                 # In the middle of a step: the way is done, the forces are not.
                 self._check_speeds()
-                lists.renew()
+                lists.skin = lists.fitting_skin(self.steps + 1)
+                lists.renew(self.steps + 1)
                 self._state = lists.state
                 self._forces(self.time_step)
                 self.steps += 1
                 left -= 1
                 self._pending = True
                 self._check_overlaps()
+            elif done == before_look:
+                self._thin_skin()
         if self._pending:
             _step.finish(
                 self._state, lists.near, lists.rigid, self.gravity, lists.edge, self.time_step,
@@ -214,6 +222,18 @@ class Simulation(Population):
             )  # fmt: skip
             self._pending = False
         self._check_overlaps()
+
+    def _thin_skin(self) -> None:
+        """Lists of nearer pairs, where particles have become slow enough for that."""
+        lists = self._lists
+        skin = lists.fitting_skin(self.steps)
+        if skin > TOO_WIDE * lists.skin:
+            return
+        self._check_overlaps()  # it names a pair by its place in the list
+        self._gather()
+        lists.skin = skin
+        lists.renew(self.steps)
+        self._state = lists.state
 
     def push(self, forces: ArrayLike, torques: ArrayLike | None = None) -> None:
         """Push the particles from without, until the next call, besides contacts and gravity.
@@ -292,25 +312,25 @@ class Simulation(Population):
         lists = self._lists
         _step.forces(
             self._state, lists.near, lists.surfaces, self._law, lists.edge, lists.wraps,
-            passed, lists.count,
+            passed, True, lists.deepest,
         )  # fmt: skip
 
     def _gather(self) -> None:
         _step.gather(self._state, self._lists.near)
 
     def _check_overlaps(self) -> None:
-        count = self._lists.count
-        b = int(count[:, 1].argmax())
-        if count[b, 1] <= self.most_overlap:
+        deepest = self._lists.deepest
+        b = int(deepest[:, 0].argmax())
+        if deepest[b, 0] <= self.most_overlap:
             return
         near, ident = self._lists.near, self._lists.ident
-        k = int(count[b, 2])
-        low = int(np.searchsorted(near.first, k, side="right")) - 1
+        k = int(deepest[b, 1])
+        low = int(near.owner[k])
         i, j = int(ident[low]), int(ident[near.partner[k]])
         place = ", ".join(f"{c:.4g}" for c in self._state.place[low, :3])
         raise InputError(
             f"step {self.steps}: particles {i} and {j} at ({place}) [m] overlap by "
-            f"{count[b, 1]:.2g} of a radius, more than {self.most_overlap:g}; part them at the "
+            f"{deepest[b, 0]:.2g} of a radius, more than {self.most_overlap:g}; part them at the "
             "start, or take a smaller time step, stiffer particles or a larger most_overlap."
         )
 

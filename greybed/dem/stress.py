@@ -44,10 +44,10 @@ def pair_forces(simulation: Simulation) -> tuple[NDArray[np.int64], Array, Array
     state = lists.state._replace(load=np.zeros((n, 8)))
     none = lists.surfaces._replace(kinds=np.zeros(0, np.int64))
     _step.forces(
-        state, alone, none, simulation._law, lists.edge, lists.wraps, 0.0, np.zeros((n, 3))
+        state, alone, none, simulation._law, lists.edge, lists.wraps, 0.0, False, np.zeros((n, 2))
     )
     acts = alone.crossing[:, :3].any(axis=1)
-    low = np.repeat(np.arange(n), np.diff(near.first))[acts]
+    low = near.owner[:m][acts]
     high = near.partner[:m][acts]
     shift = near.shift[:m][acts].astype(np.int64)
     images = np.stack([shift // 9, shift // 3 % 3, shift % 3], axis=1) - 1

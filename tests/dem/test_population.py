@@ -142,10 +142,10 @@ def test_old_lists_have_rows_for_spheres_that_come(monkeypatch):
     rows = []
     original = Lists.renew
 
-    def renew(self, keep=None):
+    def renew(self, step, keep=None):
         rows.append([len(part.first) for part in (self.near, self.surfaces)])
         rows.append([len(self.near.into), len(self.state.place) + 1])
-        original(self, keep)
+        original(self, step, keep)
 
     monkeypatch.setattr(Lists, "renew", renew)
     sim.insert(np.arange(30).reshape(-1, 1) * [0, 0, 3 * R] + [R, R, 50 * R], R)
