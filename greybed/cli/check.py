@@ -60,7 +60,7 @@ def _ranges(closure: Closure) -> str:
 
     lines = ["  markers"]
     lines += [
-        f"    {marker.name:<28}{allowed(marker):<14}{marker.meaning}"
+        f"    {marker.name:<28}{allowed(marker):<16} {marker.meaning}"
         for marker in closure.markers.markers
     ]
     low, high = closure.domain.low, closure.domain.high

@@ -42,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--epochs",
         type=int,
         metavar="N",
-        help="default: 40, of view factors up to 600 where rows are few",
+        help="default: 40, up to 600 where rows are few; of drag 20",
     )
     parser.add_argument(
         "--no-curve", action="store_true", help="leave out the learning curve, which takes as long "

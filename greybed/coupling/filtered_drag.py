@@ -16,12 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from greybed.closures.drag.filtered import Material
-from greybed.closures.drag.filtered.force import (
-    FilteredForce,
-    KeptDrag,
-    Law,
-    filtered_force,
-)
+from greybed.closures.drag.filtered.compiled import axis_drag
+from greybed.closures.drag.filtered.force import KeptDrag, Law
 from greybed.closures.drag.filtered.naming import kept_drag
 from greybed.core.errors import InputError
 
@@ -116,31 +112,21 @@ class FilteredDrag:
         markers = getattr(self.closure, "markers", None)
         return bool(getattr(markers, "linear", False))
 
-    def force(
-        self, phi: Array, slip: Array, size: float, gradient: Array | None, parcels: float = 1.0
-    ) -> FilteredForce:
-        """Filtered drag of n places with cells of that size [m]."""
-        if gradient is not None and not self.gas_weight:
-            gradient = gradient + self.material.gas_density * self.gravity
-        found = filtered_force(
-            self.closure, self.material, self.law, self.gravity, phi, slip,
-            self.filter_ratio * size, gradient if self.needs_gradient else None, parcels,
-        )  # fmt: skip
-        self.extrapolated = float(np.mean(found.prediction.extrapolates))
-        return found
-
     def implicit(
         self, phi: Array, slip: Array, size: float, gradient: Array | None, parcels: float = 1.0
     ) -> ImplicitDrag:
-        """The same, made linear in the slip along each axis."""
-        f = self.force(phi, slip, size, gradient, parcels)
-        kept = np.repeat(f.prediction.kept_across[:, None], 3, axis=1)
-        kept[:, self.axis] = f.prediction.kept_along
-        secant = (f.beta * (1.0 - f.share))[:, None] * kept
-        steep = np.stack([f.derivative[:, a, a] for a in range(3)], axis=1)
-        coefficient = np.clip(steep, STEEPEST[0] * secant, STEEPEST[1] * secant)
-        pull = f.force - secant * slip
-        return ImplicitDrag(coefficient, f.force - coefficient * slip, secant, pull, f.beta)
+        """Filtered drag of n places, with cells of that size [m], linear along each axis."""
+        if gradient is not None and not self.gas_weight:
+            gradient = gradient + self.material.gas_density * self.gravity
+        f = axis_drag(
+            self.closure, self.material, self.law, self.gravity, phi, slip,
+            self.filter_ratio * size, gradient if self.needs_gradient else None, parcels,
+        )  # fmt: skip
+        self.extrapolated = float(np.mean(f.extrapolates))
+        coefficient = np.clip(f.diagonal, STEEPEST[0] * f.secant, STEEPEST[1] * f.secant)
+        return ImplicitDrag(
+            coefficient, f.force - coefficient * slip, f.secant, f.force - f.secant * slip, f.beta
+        )
 
     # -- the two-fluid solver -----------------------------------------------------------------
 

@@ -22,11 +22,11 @@ from greybed.training.drag_score import force_of, guesses, score_of, score_table
 
 Array = NDArray[np.float64]
 
-EPOCHS = 40
+EPOCHS = 20
 FOLDS = 5
 LEAST_CASES = 3
 LEAST_ROWS = 500
-SHARES = (0.25, 0.5, 0.75, 1.0)
+SHARES = (0.25, 0.5, 1.0)
 
 
 def fit(

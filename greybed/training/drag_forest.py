@@ -10,7 +10,7 @@ from greybed.closures.drag.filtered import Gate
 from greybed.closures.drag.filtered.closure import LOG_BOUND
 from greybed.closures.drag.filtered.features import DragMarkerSet
 from greybed.closures.predictors import Forest
-from greybed.training.drag_rows import MOST_KEPT, DragRows
+from greybed.training.drag_rows import MOST_KEPT, DragRows, heard
 from greybed.training.forest import flat_trees, leaves_of
 
 Array = NDArray[np.float64]
@@ -61,7 +61,8 @@ def fit_drag_forest(rows: DragRows, chosen: DragMarkerSet, gate: Gate, *, seed: 
         n_estimators=TREES, max_leaf_nodes=LEAVES, min_samples_leaf=LEAST_ROWS, max_samples=0.5,
         max_features=0.5, random_state=seed, n_jobs=1,
     )  # fmt: skip
-    model.fit(features.astype(np.float32), kept, sample_weight=each.sum(axis=1))
+    told = np.where(heard(features), features, 0.0)
+    model.fit(told.astype(np.float32), kept, sample_weight=each.sum(axis=1))
     forest = flat_trees([tree.tree_ for tree in model.estimators_])
     opening = gate(rows.markers["solid_fraction"], rows.markers["filter_size"])
     value = np.zeros((len(forest.feature), 3))

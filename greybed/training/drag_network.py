@@ -19,14 +19,16 @@ from greybed.closures.drag.filtered.closure import (
 from greybed.closures.drag.filtered.features import DragMarkerSet
 from greybed.closures.drag.filtered.force import FADE
 from greybed.closures.predictors import Network
-from greybed.training.drag_rows import DragRows
+from greybed.training.drag_rows import DragRows, heard
 
 Array = NDArray[np.float64]
 
 BATCH = 512
 LEARNING_RATE = 2e-2
-# How much H itself counts beside the drift flux, each over its variance.
+# How much H itself and the drift flux across count beside that along gravity, each over its
+# variance.
 OF_KEPT = 0.5
+OF_ACROSS = 0.3
 DECAY = 1e-5
 SPREAD_ROWS = 20_000
 
@@ -131,12 +133,15 @@ def fit_drag_network(
     start = Network.random(features.shape[1], hidden, seed, chosen.outputs, bent=True)
     # No correction to begin with.
     start.weights[-1][:, :] *= 0.1
+    used = heard(features)
+    start.weights[0][~used] = 0.0  # and stays: the feature is 0 in all rows that follow
     opening = gate(rows.markers["solid_fraction"], rows.markers["filter_size"])
     linear = chosen.linear
     with one_thread():
-        t = _tensors(rows, (features - mean) / scale, opening)
+        t = _tensors(rows, (features - mean) / scale * used, opening)
         # What each part of the loss is measured in: its variance.
         of_drift = float(t["drift"][:, 0].var()) + 1e-12
+        of_across = float(t["drift"][:, 1:].var(dim=0).sum()) + 0.01 * of_drift
         clean = t["clean"] > 0.0
         of_kept = float(t["kept"][clean].var()) + 1e-12
         weights = [torch.tensor(w, requires_grad=True) for w in start.weights]
@@ -152,7 +157,8 @@ def fit_drag_network(
                 b = {name: value[index] for name, value in t.items()}
                 raw = _trunk(b["x"], weights, biases) @ weights[-1] + biases[-1]
                 drift = _drift(b, raw, linear)
-                loss = ((drift - b["drift"]) ** 2).sum(dim=1).mean() / of_drift
+                square = ((drift - b["drift"]) ** 2).mean(dim=0)
+                loss = square[0] / of_drift + OF_ACROSS * square[1:].sum() / of_across
                 fast = torch.where(b["clean"] > 0.0, b["slip"][:, 0] * b["phi"], 1.0)
                 kept = 1.0 + drift[:, 0] / fast
                 off = b["clean"] * (kept - b["kept"]) ** 2

@@ -24,8 +24,10 @@ Array = NDArray[np.float64]
 LEAST_SLIP = 0.1
 # Kept fractions that rows of a clean quotient show; beyond them is a slip that nearly vanishes.
 MOST_KEPT = 3.0
+# Values of a feature from which on it is used.
+LEAST_VALUES = 20
 # Rows of a fit, drawn evenly over the cases: more of them say little that is new.
-MOST_ROWS = 30_000
+MOST_ROWS = 24_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +100,16 @@ class DragRows:
     def of(self, chosen: DragMarkerSet) -> dict[str, Array]:
         """The markers of a set, as keywords for ``predict``."""
         return {name: self.markers[name] for name in chosen.names}
+
+
+def heard(features: Array) -> NDArray[np.bool_]:
+    """Which features (n_features,) a fit may use: those with many values.
+
+    Re of a handful of materials says which case a row is from, and a fit that uses it fails on the
+    next material: on 12 cases of 7 materials R2 of H fell from 0.85 to 0.82. Such a feature still
+    bounds the domain.
+    """
+    return np.array([len(np.unique(column)) >= LEAST_VALUES for column in features.T])
 
 
 def drag_rows(data: Any) -> DragRows:

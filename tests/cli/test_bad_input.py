@@ -354,7 +354,7 @@ def test_check_of_a_closure_whose_limits_fail_gives_one(here, capsys, monkeypatc
 
     sound = load("mlp.closure")
     leaking = Leaking(sound.markers, sound.predictor, sound.domain, sound.card)
-    monkeypatch.setattr("greybed.closures.load", lambda path: leaking)
+    monkeypatch.setattr("greybed.closures.load_any", lambda path: leaking)
     assert main(["check", "mlp.closure", "--out", "out"]) == 1
     assert "FAIL" in capsys.readouterr().out
     assert json.loads(Path("out/summary.json").read_text())["passed"] is False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -19,7 +20,9 @@ from greybed.closures.drag.filtered import (
     filtered_force,
     frame_of,
 )
+from greybed.closures.drag.filtered.compiled import axis_drag
 from greybed.closures.drag.filtered.limits import FCC, check_limits, random_markers, vector_cases
+from greybed.closures.viewfactor.closure import Domain
 from greybed.core.errors import InputError, RangeError
 
 FORMS = [(kind, markers) for kind in ("mlp", "forest") for markers in MARKER_SETS]
@@ -85,6 +88,28 @@ def test_derivative_is_that_of_the_force(name):
         error = np.abs(numeric - found.derivative[:, :, j]).max(axis=1) / (found.beta + 1.0)
         # Second order of the step over a slip of u_t, and round-off over the step.
         assert np.quantile(error, 0.98) < 1e-7
+
+
+@pytest.mark.parametrize("markers", MARKER_SETS)
+def test_compiled_and_plain_forms_agree(markers):
+    closure = FilteredDragClosure.untrained("mlp", markers, seed=6)
+    some = closure.markers.features(random_markers(closure, 2000, seed=2))
+    closure = dataclasses.replace(closure, domain=Domain.of(some))
+    phi, slip, _, gradient = flow(500, seed=8)
+    slip[0], slip[1, [0, 2]] = 0.0, 0.0
+    phi[2], phi[3] = 0.0, closure.gate.packing
+    for gravity in ([0, -1, 0], [0, 0, 1]):
+        f = filtered_force(closure, FCC, LAW, gravity, phi, slip, 1.5e-3, gradient, 2.0)
+        c = axis_drag(closure, FCC, LAW, gravity, phi, slip, 1.5e-3, gradient, 2.0)
+        scale = np.abs(f.force).max(axis=1, keepdims=True) + 1e-9
+        assert (np.abs(c.force - f.force) < 1e-12 * scale).all()
+        diagonal = np.stack([f.derivative[:, a, a] for a in range(3)], axis=1)
+        steepest = np.abs(f.derivative).max(axis=(1, 2))[:, None] + 1e-9
+        assert (np.abs(c.diagonal - diagonal) < 1e-11 * steepest).all()
+        assert (c.extrapolates == f.prediction.extrapolates).all()
+        axis = int(np.abs(gravity).argmax())
+        along = f.beta * (1.0 - f.share) * f.prediction.kept_along
+        np.testing.assert_allclose(c.secant[:, axis], along, rtol=1e-12)
 
 
 def test_without_slip_the_derivative_is_the_kept_drag():

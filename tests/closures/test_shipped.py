@@ -12,7 +12,8 @@ NAMES = ("exchange_mlp_exchange", "viewfactor_mlp_pencil", "viewfactor_mlp_publi
 
 
 def test_names_and_size():
-    assert shipped_names() == NAMES
+    # Those of filtered drag have tests of their own.
+    assert tuple(n for n in shipped_names() if not n.startswith("filtered_drag")) == NAMES
     assert sum(model_path(f"shipped:{name}").stat().st_size for name in NAMES) < 1_000_000
 
 
