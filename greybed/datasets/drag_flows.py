@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from greybed.cfd.grid import Grid
 from greybed.cfd.kinetic import Granular
-from greybed.cfd.twofluid import TwoFluid
+from greybed.cfd.twofluid import Correction, TwoFluid
 from greybed.closures.drag import drag_law
 from greybed.closures.drag.filtered import Material
 from greybed.datasets.drag_design import FlowDesign
@@ -41,9 +41,16 @@ def grid_of(design: FlowDesign) -> Grid:
 
 
 class TwoFluidFlow:
-    """Two fluids in a box that repeats; the mean pressure gradient carries the weight."""
+    """Two fluids in a box that repeats; the mean pressure gradient carries the weight.
 
-    def __init__(self, design: FlowDesign) -> None:
+    Parameters
+    ----------
+    design : FlowDesign
+    correction : callable, optional
+        Of the drag, where the grid does not resolve clusters.
+    """
+
+    def __init__(self, design: FlowDesign, correction: Correction | None = None) -> None:
         self.design, self.grid = design, grid_of(design)
         random = np.random.default_rng(design.seed).uniform(-1.0, 1.0, self.grid.shape)
         start = np.minimum(
@@ -54,7 +61,7 @@ class TwoFluidFlow:
             gas_density=design.gas_density, gas_viscosity=design.gas_viscosity,
             drag=drag_law(design.law), gravity=(0.0, -GRAVITY, 0.0),
             granular=Granular(restitution=design.restitution, packing=design.packing),
-            longest_step=_OF_RELAXATION * clock(design),
+            longest_step=_OF_RELAXATION * clock(design), correction=correction,
         )  # fmt: skip
 
     @property
