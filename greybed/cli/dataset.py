@@ -1,8 +1,10 @@
-"""Make a data set for training: packings are generated, traced and written with their markers.
+"""Make a data set for training: traced packings, or filtered flows of gas and particles.
 
 Examples:
   greybed dataset viewfactor --out runs/viewfactor.h5
   greybed dataset viewfactor design.toml --out runs/viewfactor.h5 --workers 2
+  greybed dataset drag examples/filtered_drag/small.toml --out runs/drag.h5
+  greybed dataset drag examples/filtered_drag/default.toml --out runs/drag.h5 --minutes 60
 
 Without a design the default one is made: 70 packings of solid fraction 0.05 to 0.64, random,
 walled, sheared, layered and on lattices, some minutes on two cores. A killed run continues where
@@ -22,6 +24,10 @@ it stopped when the same command is given again. A design lists packings and how
 
 Other kinds: "walled" (container = "box" or "cylinder"), "sheared" (stretch), "layered" (upper,
 upper_sizes) and "lattice" (lattice = "sc", "bcc" or "fcc", jitter, cells).
+
+A design of filtered drag lists flows in boxes that repeat, and the filters that go over them; see
+docs/filtered_drag.md. With --minutes it stops after so long and goes on when it is given again;
+with --case only the named ones run, so that several processes can share the work.
 """
 
 from __future__ import annotations
@@ -32,7 +38,7 @@ import time
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of ``greybed dataset``."""
-    parser.add_argument("quantity", choices=("viewfactor",), help="what the closure will give")
+    parser.add_argument("quantity", choices=("viewfactor", "drag"), help="what it will give")
     parser.add_argument("design", nargs="?", help="TOML file (default: the built-in design)")
     parser.add_argument("--out", required=True, metavar="FILE", help="HDF5 file to write")
     parser.add_argument(
@@ -40,10 +46,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="processes; the result does not depend on it (default: 1, on all cores)",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, metavar="S", help="overrides the design's seed")
+    parser.add_argument("--minutes", type=float, metavar="M", help="drag: stop after so long")
+    parser.add_argument(
+        "--case", action="append", default=[], metavar="NAME", help="drag: only this case; repeat"
+    )
 
 
 def run(options: argparse.Namespace) -> int:
     """Make the data set."""
+    if options.quantity == "drag":
+        from greybed.cli.dataset_drag import run_drag
+
+        return run_drag(options)
+    for name, given in (("--minutes", options.minutes is not None), ("--case", options.case)):
+        if given:
+            from greybed.core.errors import InputError
+
+            raise InputError(f"{name} is for greybed dataset drag; leave it out.")
     from dataclasses import replace
 
     from greybed.core.config import read_case

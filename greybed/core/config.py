@@ -76,6 +76,11 @@ def counts(default: Any = MISSING) -> Any:
     return dataclasses.field(default=default, metadata={"counts": True})
 
 
+def wholes(default: Any = MISSING) -> Any:
+    """Field of a case: a list of whole numbers [-]."""
+    return dataclasses.field(default=default, metadata={"wholes": True})
+
+
 @dataclasses.dataclass(frozen=True)
 class _Place:
     """Where a value stands: file and dotted key."""
@@ -214,6 +219,11 @@ def _value(value: Any, hint: Any, rules: Mapping[str, Any], place: _Place) -> An
         )
     if "counts" in rules:
         return _counts(value, place)
+    if "wholes" in rules:
+        listed = isinstance(value, list) and all(type(n) is int for n in value)
+        if not listed or not value:
+            raise InputError(f"{place} = {value!r} must be a list of whole numbers, like [4, 8].")
+        return tuple(value)
     if "options" in rules:
         return _choice(value, rules["options"], place)
     if "size" in rules:
