@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 from dataclasses import asdict, dataclass, fields
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -219,3 +220,11 @@ def read_filtered_drag(path: str | os.PathLike[str]) -> FilteredDrag:
     if data.digest != stored:
         raise InputError(f"{place}: the data set was changed (its SHA-256 differs); copy it again.")
     return data
+
+
+def shipped_filtered_drag() -> FilteredDrag:
+    """The data set that comes with greybed, of ``examples/filtered_drag/default.toml``.
+
+    ``docs/filtered_drag.md`` says which of its cases are finished in it.
+    """
+    return read_filtered_drag(str(files("greybed.datasets").joinpath("filtered_drag.h5")))
