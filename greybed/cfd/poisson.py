@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,9 +28,10 @@ class _Level:
     diag: Array
     inverse: Array
     halved: tuple[bool, bool, bool]  # z, y, x, on the way down
+    at: tuple[NDArray[np.int64], ...]  # fine faces at the coarse ones below
+    share: tuple[Array, ...]  # one over the way between coarse cells, in fine ones
     p: Array
     b: Array
-    r: Array
 
 
 class Poisson:
@@ -78,7 +80,7 @@ class Poisson:
     def update(self, tx: Array, ty: Array, tz: Array) -> None:
         """Take other transmissibilities of the same shapes."""
         for name, t in (("tx", tx), ("ty", ty), ("tz", tz)):
-            if not (np.isfinite(t).all() and (t >= 0.0).all()):
+            if not (t.min() >= 0.0 and t.max() < np.inf):
                 raise InputError(f"{name}: transmissibilities must be finite and at least 0.")
         closed = {0: tx, 1: ty}.get(self._turn)
         if closed is not None and closed.any():
@@ -88,19 +90,29 @@ class Poisson:
             self._lay_levels(tx, ty, tz)
         top = self.levels[0]
         top.tx[...], top.ty[...], top.tz[...] = tx, ty, tz
+        rims = self._rims(top)
+        self.singular = all(self.periodic[k // 2] or not rim.any() for k, rim in enumerate(rims))
         for number, level in enumerate(self.levels):
-            _multigrid.diagonal(level.tx, level.ty, level.tz, level.diag)
-            with np.errstate(divide="ignore"):
-                level.inverse[...] = np.where(level.diag > 0.0, 1.0 / level.diag, 0.0)
+            faces = (level.tx, level.ty, level.tz)
+            _multigrid.diagonal(*faces, level.diag, level.inverse)
             if number + 1 < len(self.levels):
                 below = self.levels[number + 1]
-                for axis, name in enumerate(("tz", "ty", "tx")):
-                    _multigrid.coarsen(
-                        getattr(level, name), axis, level.halved, getattr(below, name)
-                    )
-        rims = (top.tx[..., 0], top.tx[..., -1], top.ty[:, 0], top.ty[:, -1], top.tz[0], top.tz[-1])
-        self.singular = all(self.periodic[k // 2] or not rim.any() for k, rim in enumerate(rims))
-        self._inverse = np.linalg.pinv(self._dense(self.levels[-1]), hermitian=True)
+                _multigrid.coarsen(
+                    *faces, level.halved, level.at, level.share, below.tx, below.ty, below.tz
+                )
+            # What a side leads to is in the diagonal: loops wrap round, and find nothing there.
+            for k, rim in enumerate(self._rims(level)):
+                if not self.periodic[k // 2]:
+                    rim[...] = 0.0
+        last = self.levels[-1]
+        matrix = np.empty((last.diag.size, last.diag.size))
+        _multigrid.dense(last.tx, last.ty, last.tz, last.diag, matrix)
+        self._inverse = np.linalg.pinv(0.5 * (matrix + matrix.T), hermitian=True)
+
+    @staticmethod
+    def _rims(level: _Level) -> tuple[Array, ...]:
+        tx, ty, tz = level.tx, level.ty, level.tz
+        return tx[..., 0], tx[..., -1], ty[:, 0], ty[:, -1], tz[0], tz[-1]
 
     def _lay_levels(self, tx: Array, ty: Array, tz: Array) -> None:
         """Grids of half as many cells along those axes that are strongly coupled."""
@@ -114,11 +126,16 @@ class Poisson:
             if not last:
                 strong = wide & (strength >= _WEAK * strength[wide].max())
                 halved = (bool(strong[0]), bool(strong[1]), bool(strong[2]))
+            spans = [
+                _spans(n, half, self.periodic[2 - axis])
+                for axis, (n, half) in enumerate(zip(shape, halved, strict=True))
+            ]
             self.levels.append(
                 _Level(
                     np.zeros((nz, ny, nx + 1)), np.zeros((nz, ny + 1, nx)),
                     np.zeros((nz + 1, ny, nx)), np.zeros(shape), np.zeros(shape), halved,
-                    np.zeros(shape), np.zeros(shape), np.zeros(shape),
+                    (spans[0][0], spans[1][0], spans[2][0]),
+                    (spans[0][1], spans[1][1], spans[2][1]), np.zeros(shape), np.zeros(shape),
                 )
             )  # fmt: skip
             if last:
@@ -130,42 +147,31 @@ class Poisson:
             nz, ny, nx = (-(-n // 2) if half else n for n, half in zip(shape, halved, strict=True))
             shape = (nz, ny, nx)
 
-    def _dense(self, level: _Level) -> Array:
-        """The coarsest grid as a matrix."""
-        n = level.diag.size
-        matrix, out = np.empty((n, n)), np.empty(level.diag.shape)
-        for k in range(n):
-            unit = np.zeros(n)
-            unit[k] = 1.0
-            self._times(level, unit.reshape(out.shape), out)
-            matrix[:, k] = out.ravel()
-        return 0.5 * (matrix + matrix.T)
+    def _times(self, p: Array, out: Array) -> float:
+        top = self.levels[0]
+        return float(_multigrid.times(p, top.tx, top.ty, top.tz, top.diag, self._deep(top), out))
 
-    def _times(self, level: _Level, p: Array, out: Array) -> float:
-        px, py, pz = self.periodic
-        return float(_multigrid.times(p, level.tx, level.ty, level.tz, level.diag, px, py, pz, out))
+    def _deep(self, level: _Level) -> bool:
+        return level.p.shape[0] > 1 or self.periodic[2]
 
-    def _cycle(self, number: int) -> None:
-        """One V-cycle: ``p`` of this level from its ``b``, beginning with 0."""
+    def _cycle(self, number: int, b: Array) -> Array:
+        """One V-cycle, beginning with 0: values of this level, which the next cycle overwrites."""
         level = self.levels[number]
         if number == len(self.levels) - 1:
-            level.p[...] = (self._inverse @ level.b.ravel()).reshape(level.p.shape)
-            return
-        px, py, pz = self.periodic
-        faces = (level.tx, level.ty, level.tz, level.inverse, px, py, pz)
-        level.p[...] = 0.0
-        # Black after red on the way up only: the cycle is its own transpose.
-        for colour in (0, 1):
-            _multigrid.sweep(level.p, level.b, *faces, colour)
-        self._times(level, level.p, level.r)
-        np.subtract(level.b, level.r, out=level.r)
-        hz, hy, hx = level.halved
+            level.p[...] = (self._inverse @ b.ravel()).reshape(level.p.shape)
+            return level.p
+        faces, deep = (level.tx, level.ty, level.tz), self._deep(level)
+        how = (level.halved, self.periodic[::-1])
+        # Black after red on the way down, red after black on the way up: the cycle is its own
+        # transpose.
+        _multigrid.begin(level.p, b, level.inverse)
+        _multigrid.sweep(level.p, b, *faces, level.inverse, deep, 1)
         below = self.levels[number + 1]
-        _multigrid.restrict(level.r, below.b, hx, hy, hz, px, py, pz)
-        self._cycle(number + 1)
-        _multigrid.prolong(below.p, level.p, hx, hy, hz, px, py, pz)
+        _multigrid.restrict(level.p, b, *faces, level.diag, deep, *how, below.b)
+        _multigrid.prolong(self._cycle(number + 1, below.b), level.p, *how)
         for colour in (1, 0):
-            _multigrid.sweep(level.p, level.b, *faces, colour)
+            _multigrid.sweep(level.p, b, *faces, level.inverse, deep, colour)
+        return level.p
 
     def solve(
         self,
@@ -199,32 +205,44 @@ class Poisson:
         InputError
             If the residual does not come down.
         """
-        top = self.levels[0]
-        outflow = outflow.reshape(top.b.shape)
-        start = None if start is None else start.reshape(top.b.shape)
+        shape = self.levels[0].diag.shape
+        outflow = outflow.reshape(shape)
         b = outflow - outflow.mean() if self.singular else outflow
         size = float(np.sqrt((b**2).sum()))
-        p = np.zeros_like(b) if start is None else start.copy()
-        work = np.empty_like(b)
-        self._times(top, p, work)
-        r = b - work
-        direction, old = np.zeros_like(b), 1.0
+        flux, direction, share = np.empty(shape), np.zeros(shape), 0.0
+        if start is None:
+            p, r = np.zeros(shape), b.copy()
+        else:
+            p = start.reshape(shape).copy()
+            self._times(p, flux)
+            r = b - flux
+        left, old = float((r**2).sum()), 1.0
         for iteration in range(_MOST_ITERATIONS + 1):
-            if float(np.sqrt((r**2).sum())) <= max(tolerance * size, enough):
+            if math.sqrt(left) <= max(tolerance * size, enough):
                 return (p - p.mean() if self.singular else p).reshape(self.shape), iteration
-            top.b[...] = r
-            self._cycle(0)
-            z = top.p
-            if self.singular:
-                z -= z.mean()
-            new = float((r * z).sum())
-            direction *= new / old if iteration else 0.0
-            direction += z
+            z = self._cycle(0, r)
+            new = float(_multigrid.product(r, z))
+            share = new / old if iteration else 0.0
+            _multigrid.turn(z, float(z.mean()) if self.singular else 0.0, share, direction)
             old = new
-            share = new / self._times(top, direction, work)
-            p += share * direction
-            r -= share * work
+            step = new / self._times(direction, flux)
+            left = float(_multigrid.go(step, direction, flux, p, r))
         raise InputError(
-            f"pressure: the residual is {float(np.sqrt((r**2).sum())) / size:.2g} of the outflow "
+            f"pressure: the residual is {math.sqrt(left) / size:.2g} of the outflow "
             f"after {_MOST_ITERATIONS} iterations; take a smaller time step."
         )
+
+
+def _spans(n: int, halved: bool, periodic: bool) -> tuple[NDArray[np.int64], Array]:
+    """Of each coarse face along an axis: the fine one there, and one over the way of its flux."""
+    if not halved:
+        return np.arange(n + 1), np.ones(n + 1)
+    at = np.minimum(2 * np.arange(-(-n // 2) + 1), n)
+    widths = np.diff(at).astype(np.float64)
+    way = np.empty(at.size)
+    way[1:-1] = 0.5 * (widths[1:] + widths[:-1])
+    # A side is half a cell away.
+    way[0], way[-1] = widths[0], widths[-1]
+    if periodic:
+        way[0] = way[-1] = 0.5 * (widths[0] + widths[-1])
+    return at, 1.0 / way

@@ -21,7 +21,10 @@ from greybed.core.progress import progress
 from greybed.datasets.drag_design import DragDesign, FlowDesign
 from greybed.datasets.drag_filters import sampled
 from greybed.datasets.drag_flows import GRAVITY, TwoFluidFlow, clock
+from greybed.datasets.drag_particles import ParticleFlow
 from greybed.datasets.filtered_drag import COLUMNS, WHOLE, DragCase, FilteredDrag
+
+Flow = TwoFluidFlow | ParticleFlow
 
 # Seconds between two times at which a running case is kept.
 KEEP = 60.0
@@ -47,9 +50,7 @@ def _key(case: FlowDesign, design: DragDesign) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
-def _sample(
-    flow: TwoFluidFlow, case: FlowDesign, design: DragDesign, number: int
-) -> dict[str, Any]:
+def _sample(flow: Flow, case: FlowDesign, design: DragDesign, number: int) -> dict[str, Any]:
     seen = flow.look()
     narrow = min(n for n in case.cells if n > 1)
     parts = []
@@ -67,7 +68,7 @@ def _sample(
 
 
 def _keep(
-    path: Path, flow: TwoFluidFlow | None, samples: list[dict[str, Any]], steps: int,
+    path: Path, flow: Flow | None, samples: list[dict[str, Any]], steps: int,
     stop: float, done: bool,
 ) -> None:  # fmt: skip
     rows = {}
@@ -128,7 +129,7 @@ def run_case(
         return Made(True, rows, int(stored["numbers"][1]), float(stored["numbers"][2]))
     unit = clock(case)
     with sole_writer(folder / f".{case.name}.lock"):
-        flow = TwoFluidFlow(case)
+        flow: Flow = TwoFluidFlow(case) if case.kind == "two-fluid" else ParticleFlow(case)
         if stored is not None:
             state = {n.removeprefix("state_"): a for n, a in stored.items() if n[:6] == "state_"}
             flow.restore(state)

@@ -8,13 +8,15 @@ from greybed.closures.drag import drag_law
 from greybed.core.config import choice, counts, quantity, rows, whole, wholes
 from greybed.core.errors import InputError
 
+LEAST_BOX = 8.0  # diameters across a box of particles
+
 
 @dataclass(frozen=True, kw_only=True)
 class FlowDesign:
     """A box that repeats, in which the gas carries the particles."""
 
     name: str
-    kind: str = choice(("two-fluid",))
+    kind: str = choice(("two-fluid", "cfd-dem"))
     diameter: float = quantity("length", above=0.0)  # [m]
     particle_density: float = quantity("density", above=0.0)  # [kg/m3]
     gas_density: float = quantity("density", 1.2, above=0.0)  # [kg/m3]
@@ -38,6 +40,13 @@ class FlowDesign:
             raise InputError(
                 f"case {self.name!r}: solid_fraction = {self.solid_fraction:g} [-] must be below "
                 f"packing = {self.packing:g}; take less."
+            )
+        # Particles would meet their own images.
+        least = min(self.cells) * self.cell
+        if self.kind == "cfd-dem" and least < LEAST_BOX:
+            raise InputError(
+                f"case {self.name!r}: a box of particles is {least:g} diameters across and must be "
+                f"{LEAST_BOX:g} at least along each axis; take more cells, along z too."
             )
 
     @property
