@@ -153,6 +153,12 @@ def run_case(
                             raise OutOfTimeError
                 if flow.steps >= case.most_steps and samples:
                     break  # the last samples are missing; times of a case say how far it went
+                if flow.steps >= case.most_steps and goal - flow.time > 1e-12 * goal:
+                    raise InputError(
+                        f"case {case.name!r}: most_steps = {case.most_steps} end it at "
+                        f"{flow.time:.3g} s, before its first sample at {goal:.3g} s; give more, "
+                        "or wider cells."
+                    )
                 samples.append(_sample(flow, case, design, number))
                 stop = flow.time
                 _keep(path, flow, samples, flow.steps, stop, False)

@@ -95,3 +95,9 @@ def test_filters_too_wide_for_a_box_are_refused(tmp_path):
         generate(dataclasses.replace(DESIGN, filters=(8,)), tmp_path)
     with pytest.raises(InputError, match="no case is called"):
         generate(DESIGN, tmp_path, names=["other"])
+
+
+def test_a_case_that_ends_before_its_first_sample_gives_no_rows(tmp_path):
+    short = dataclasses.replace(SMALL, most_steps=10)
+    with pytest.raises(InputError, match="before its first sample"):
+        generate(dataclasses.replace(DESIGN, case=(short,)), tmp_path)
