@@ -32,9 +32,8 @@ KEEP = 60.0
 
 @dataclass(frozen=True)
 class Made:
-    """What there is of a case: its rows, the steps made, the time of the last sample [s]."""
+    """A finished case: its rows, the steps made, the time of the last sample [s]."""
 
-    done: bool
     rows: dict[str, NDArray[np.float64]]
     steps: int
     stop: float
@@ -126,7 +125,7 @@ def run_case(
     samples: list[dict[str, Any]] = [] if stored is None else _samples(stored)
     if stored is not None and stored["numbers"][3]:
         rows = {n: np.concatenate([s[n] for s in samples]) for n in samples[0]}
-        return Made(True, rows, int(stored["numbers"][1]), float(stored["numbers"][2]))
+        return Made(rows, int(stored["numbers"][1]), float(stored["numbers"][2]))
     unit = clock(case)
     with sole_writer(folder / f".{case.name}.lock"):
         flow: Flow = TwoFluidFlow(case) if case.kind == "two-fluid" else ParticleFlow(case)
@@ -164,7 +163,7 @@ def run_case(
                 _keep(path, flow, samples, flow.steps, stop, False)
             _keep(path, None, samples, flow.steps, stop, True)
     rows = {n: np.concatenate([s[n] for s in samples]) for n in samples[0]}
-    return Made(True, rows, flow.steps, stop)
+    return Made(rows, flow.steps, stop)
 
 
 def generate(
