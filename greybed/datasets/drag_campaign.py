@@ -51,18 +51,12 @@ def _key(case: FlowDesign, design: DragDesign) -> str:
 
 def _sample(flow: Flow, case: FlowDesign, design: DragDesign, number: int) -> dict[str, Any]:
     seen = flow.look()
-    narrow = min(n for n in case.cells if n > 1)
     parts = []
     for cells in design.filters:
         # Half of the box at most: a wider filter would see little but the mean.
-        if 2 * cells <= narrow:
+        if 2 * cells <= case.narrow:
             random = np.random.default_rng([case.seed, number, cells])
             parts.append(sampled(seen, cells, design.each, random))
-    if not parts:
-        raise InputError(
-            f"case {case.name!r}: its {narrow} cells are less than two of the narrowest filter, "
-            f"{min(design.filters)} cells; take more cells or a narrower filter."
-        )
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 

@@ -54,6 +54,11 @@ class FlowDesign:
         """2 where one cell stands along z."""
         return 2 if self.cells[2] == 1 else 3
 
+    @property
+    def narrow(self) -> int:
+        """Cells across the narrowest side of the box."""
+        return min(self.cells[: self.dimension])
+
 
 @dataclass(frozen=True, kw_only=True)
 class DragDesign:
@@ -74,4 +79,11 @@ class DragDesign:
             if cells < 1:
                 raise InputError(
                     f"filters: {cells} cells is smaller than a cell; take whole numbers from 1."
+                )
+        for case in self.case:
+            if 2 * min(self.filters) > case.narrow:
+                raise InputError(
+                    f"case {case.name!r}: its {case.narrow} cells are less than two of the "
+                    f"narrowest filter, {min(self.filters)} cells; take more cells or a narrower "
+                    "filter."
                 )
