@@ -100,7 +100,11 @@ def closures(
 
     ``square`` is twice the squared rates of strain. Kinematic means over density and phi;
     ``second`` is bulk less two thirds of shear. ``fixed`` below 0: temperature from production =
-    dissipation, J theta / d + (3 gamma eps / density) sqrt(theta) = what viscosities make.
+    dissipation, J theta / d + (3 gamma eps / density + K dilation) sqrt(theta) = what viscosities
+    make. K theta, the pressure over phi, does work where the flow expands; without it here, the
+    pressure would push without drawing on the fluctuations and feed the flow without end. Where
+    the flow is compressed the work is left out: it would heat dilute cells without end, and as a
+    viscosity it would be stiffer than all others.
     """
     for i in range(phi.size):
         x = min(max(phi[i], 0.0), packing)
@@ -114,7 +118,9 @@ def closures(
             # Both over phi: finite where there are no particles.
             loss = j * (x + 1e-4) / d
             make = d * (m * deviator + bulk * trace * trace)
-            middle = 3.0 * gamma[i] * (1.0 - x) / density if drag_loss else 0.0
+            middle = (1.0 + 2.0 * (1.0 + e) * x * g) * max(trace, 0.0)
+            if drag_loss:
+                middle += 3.0 * gamma[i] * (1.0 - x) / density
             root = math.sqrt(middle * middle + 4.0 * loss * make)
             speed = 2.0 * make / (middle + root) if make > 0.0 else 0.0
             # No more than differs over a cell: free paths of dilute cells are longer than they.
