@@ -16,11 +16,11 @@ from greybed.closures.predictors import Network
 from greybed.closures.viewfactor.closure import Domain
 from greybed.core.errors import InputError
 from greybed.export import (
-    CompiledDrag,
-    OnnxDrag,
+    CompiledClosure,
+    OnnxClosure,
     compile_cpp,
-    export_drag_cpp,
-    export_drag_onnx,
+    export_cpp,
+    export_onnx,
     find_compiler,
 )
 from greybed.export.replay import CPP_TOLERANCE, ONNX_TOLERANCE, replay
@@ -47,8 +47,8 @@ def programs(tmp_path_factory):
         key = (kind, markers, flags)
         if key not in made:
             folder = tmp_path_factory.mktemp("drag")
-            header = export_drag_cpp(closure_of(kind, markers), folder)
-            made[key] = CompiledDrag(compile_cpp(header, folder / "build", flags))
+            header = export_cpp(closure_of(kind, markers), folder)
+            made[key] = CompiledClosure(compile_cpp(header, folder / "build", flags))
         return made[key]
 
     return get
@@ -69,7 +69,7 @@ def test_cpp_holds_limits_and_golden_rows(kind, markers, programs):
 @pytest.mark.parametrize(("kind", "markers"), FORMS)
 def test_onnx_holds_limits_and_golden_rows(kind, markers, tmp_path):
     closure = closure_of(kind, markers)
-    graph = OnnxDrag(export_drag_onnx(closure, tmp_path / "a.onnx"))
+    graph = OnnxClosure(export_onnx(closure, tmp_path / "a.onnx"))
     result = replay(closure, graph, ONNX_TOLERANCE)
     assert result["passed"], result
     assert result["max_relative_error"] < 1e-11
@@ -113,11 +113,11 @@ def test_forces_and_derivatives_in_cpp_are_those_of_python(kind, markers, progra
 
 @needs_compiler
 def test_a_changed_header_says_so(tmp_path):
-    header = export_drag_cpp(closure_of("mlp", "plain"), tmp_path, "bed")
+    header = export_cpp(closure_of("mlp", "plain"), tmp_path, "bed")
     text = header.read_text()
     at = text.index("{\n      ", text.index("weight_0()")) + len("{\n      ")
     header.write_text(f"{text[:at]}1.0 + {text[at:]}")
-    program = CompiledDrag(compile_cpp(header, tmp_path / "build"))
+    program = CompiledClosure(compile_cpp(header, tmp_path / "build"))
     assert program.failing_rows > 0
     assert subprocess.run([program.program]).returncode == 1
 
@@ -126,7 +126,7 @@ def test_a_network_that_has_no_header_is_refused(tmp_path):
     closure = FilteredDragClosure.untrained()
     odd = dataclasses.replace(closure, predictor=Network.random(6, (6, 6), 0, 3, bent=True))
     with pytest.raises(InputError, match=r"layers of \[6, 6\] neurons must be bent and multiples"):
-        export_drag_cpp(odd, tmp_path)
+        export_cpp(odd, tmp_path)
 
 
 @needs_compiler
