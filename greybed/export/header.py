@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import textwrap
 from functools import cache
 from pathlib import Path
@@ -85,7 +86,9 @@ def _quoted(text: str) -> str:
         chr(byte) if 32 <= byte < 127 and byte not in b'"\\?' else f"\\{byte:03o}"
         for byte in text.encode()
     )
-    return f'"{body}"'
+    # A break must not fall into an octal sequence; adjacent literals are one.
+    pieces = re.findall(r"(?:\\[0-7]{3}|[^\\]){1,80}", body) or [""]
+    return "\n      ".join(f'"{piece}"' for piece in pieces)
 
 
 def context_of(form: Form) -> dict[str, Any]:

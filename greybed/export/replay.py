@@ -187,13 +187,14 @@ class CompiledClosure:
             and gas density, gas viscosity, gravity, solid fraction, slip, pressure gradient,
             filter size, F and Re dF/dRe of the drag law, parcels.
         policy : str
-            ``clamp``, ``baseline`` or ``abort``.
+            ``clamp``, ``baseline``, ``abort`` or ``extrapolate``.
 
         Returns
         -------
         table : (n, k) float
             Factor and derivatives for the inputs, or force (3), derivative (9) and exchange
-            coefficient; last the status: 0 inside, 1 clamped, 2 baseline, 3 refused.
+            coefficient; last the status: 0 inside, 1 clamped, 2 baseline, 3 refused, 4
+            extrapolated.
         counts : (calls, outside, invalid)
         """
         text = "\n".join(",".join(f"{x:.17g}" for x in row) for row in np.atleast_2d(rows))
@@ -203,8 +204,8 @@ class CompiledClosure:
         return table, (calls, outside, invalid)
 
     def forces(self, rows: ArrayLike) -> tuple[Array, Array]:
-        """Forces (n, 3) [N m-3] and derivatives (n, 3, 3) [N s m-4] of rows, the closure held."""
-        table, _ = self.guarded(rows, "clamp")
+        """Forces (n, 3) [N m-3] and derivatives (n, 3, 3) [N s m-4] of rows, as in Python."""
+        table, _ = self.guarded(rows, "extrapolate")
         return table[:, :3], table[:, 3:12].reshape(-1, 3, 3)
 
     def nanoseconds(self) -> tuple[float, float]:

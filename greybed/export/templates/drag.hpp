@@ -289,6 +289,10 @@ GREYBED_DEVICE inline Status guarded(const double* given, double log_reynolds, G
     nothing_kept(out, 1.0, 0.0);
     return Status::baseline;
   }
+  if (guard.policy == Policy::extrapolate) {
+    kept<WANTED>(m, f, nullptr, out);
+    return Status::extrapolated;
+  }
   const Inner inner(f.value);
   kept<WANTED>(m, f, &inner, out);
   return Status::clamped;

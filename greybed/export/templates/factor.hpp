@@ -207,6 +207,10 @@ GREYBED_DEVICE inline Status guarded(const double* given, Guard& guard, T& facto
     factor = whole(parts, parts.baseline);
     return Status::baseline;
   }
+  if (guard.policy == Policy::extrapolate) {
+    factor = whole(parts, learnt(parts, nullptr));
+    return Status::extrapolated;
+  }
   const Inner inner(features);
   factor = whole(parts, learnt(parts, &inner));
   return Status::clamped;

@@ -15,7 +15,7 @@
 // Physical numbers in, under a Guard: eval  eval_grad  (struct Inputs; the units are in the names)
 //
 // Without a Guard, markers out of their ranges give NaN and the closure extrapolates as it likes.
-// A Guard says what is done outside of the training data (clamp, baseline, abort) and counts. The
+// A Guard says what is done outside of the training data (clamp, baseline, abort, extrapolate) and counts. The
 // host owns it, one for each thread. All calls with a Guard return what they did as a Status.
 //
 // C++11 or later, no heap, no threads, no state: call it from as many threads as you like. Call

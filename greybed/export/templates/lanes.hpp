@@ -62,12 +62,15 @@ GREYBED_HOT d2 signed_as(const d2& x, const d2& sign) {
   const d2 mask = _mm_castsi128_pd(_mm_set1_epi64x(0x7fffffffffffffffLL));
   return _mm_or_pd(x, _mm_andnot_pd(mask, sign));
 }
+/// A number that the compiler knows nothing of from here on.
+GREYBED_HOT void hide(d2& v) { __asm__("" : "+x"(v)); }
 GREYBED_HOT double total(const d2& v) { return v[0] + v[1]; }
 GREYBED_HOT void reduced(const d2& x, d2& r, d2& power) {
   const d2 magic = _mm_set1_pd(6755399441055744.0);  // 1.5 * 2^52: adding it rounds
   d2 t = x * _mm_set1_pd(1.4426950408889634) + magic;
-  __asm__("" : "+x"(t));  // -ffast-math would put what was added and what is taken off together
-  const d2 k = t - magic;
+  hide(t);  // -ffast-math would put what was added and what is taken off together,
+  d2 k = t - magic;
+  hide(k);  // ... or share out the product
   r = (x - k * _mm_set1_pd(0.693147180369123816490)) - k * _mm_set1_pd(1.90821492927058770002e-10);
   power = _mm_castsi128_pd(
       _mm_slli_epi64(_mm_add_epi64(_mm_castpd_si128(t), _mm_set1_epi64x(1023)), 52));
@@ -139,12 +142,14 @@ GREYBED_HOT v4 signed_as(const v4& x, const v4& sign) {
   const v4 mask = _mm256_castsi256_pd(_mm256_set1_epi64x(0x7fffffffffffffffLL));
   return _mm256_or_pd(x, _mm256_andnot_pd(mask, sign));
 }
+GREYBED_HOT void hide(v4& v) { __asm__("" : "+x"(v)); }
 GREYBED_HOT double total(const v4& v) { return (v[0] + v[1]) + (v[2] + v[3]); }
 GREYBED_HOT void reduced(const v4& x, v4& r, v4& power) {
   const v4 magic = _mm256_set1_pd(6755399441055744.0);
   v4 t = x * _mm256_set1_pd(1.4426950408889634) + magic;
-  __asm__("" : "+x"(t));
-  const v4 k = t - magic;
+  hide(t);
+  v4 k = t - magic;
+  hide(k);
   r = (x - k * _mm256_set1_pd(0.693147180369123816490)) -
       k * _mm256_set1_pd(1.90821492927058770002e-10);
 #if defined(__AVX2__)

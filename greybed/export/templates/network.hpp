@@ -18,35 +18,36 @@ GREYBED_DEVICE inline void network(const double* features, double* raw, double* 
   for (int k = 0; k < ROWS; ++k) {
     raw[k] = dot<{{ wide // 4 }}>(x_{{ top }}, last() + {{ wide }} * k) + bias_{{ top }}()[k];
   }
-  if (GRADIENT == 0) return;
-  double back_{{ top }}[N_VALUES * {{ wide }}];
-  for (int k = 0; k < N_VALUES; ++k) {
-    Sums<{{ wide // 4 }}> sums;
-    sums.get(last() + {{ wide }} * k);
-    sums.scale_by(s_{{ top }});
-    sums.put(back_{{ top }} + {{ wide }} * k);
-  }
+  if (GRADIENT > 0) {
+    double back_{{ top }}[N_VALUES * {{ wide }}];
+    for (int k = 0; k < N_VALUES; ++k) {
+      Sums<{{ wide // 4 }}> sums;
+      sums.get(last() + {{ wide }} * k);
+      sums.scale_by(s_{{ top }});
+      sums.put(back_{{ top }} + {{ wide }} * k);
+    }
 {% for k in range(top - 1, 0, -1) %}
 {% set n_in = layers[k][0] %}
 {% set n_out = layers[k][1] %}
-  Fan<N_VALUES, {{ n_in // 4 }}, {{ n_out }}> fan_{{ k }};
-  fan_{{ k }}.set(0.0);
-  for (int j = 0; j < {{ n_out }}; ++j) fan_{{ k }}.add(turned_{{ k }}() + {{ n_in }} * j, back_{{ k + 1 }} + j);
-  double back_{{ k }}[N_VALUES * {{ n_in }}];
-  fan_{{ k }}.put_scaled(s_{{ k }}, back_{{ k }}, {{ n_in }});
+    Fan<N_VALUES, {{ n_in // 4 }}, {{ n_out }}> fan_{{ k }};
+    fan_{{ k }}.set(0.0);
+    for (int j = 0; j < {{ n_out }}; ++j) fan_{{ k }}.add(turned_{{ k }}() + {{ n_in }} * j, back_{{ k + 1 }} + j);
+    double back_{{ k }}[N_VALUES * {{ n_in }}];
+    fan_{{ k }}.put_scaled(s_{{ k }}, back_{{ k }}, {{ n_in }});
 {% endfor %}
-  // Two chains, for a sum waits for the one before it.
-  Fan<N_VALUES, GRADIENT, {{ layers[0][1] }}> even;
-  Fan<N_VALUES, GRADIENT, {{ layers[0][1] }}> odd;
-  even.set(0.0);
-  odd.set(0.0);
-  for (int j = 0; j < {{ layers[0][1] }}; j += 2) {
-    even.add(inward() + N_COLUMNS * j + 4 * FIRST, back_1 + j);
-    odd.add(inward() + N_COLUMNS * (j + 1) + 4 * FIRST, back_1 + j + 1);
+    // Two chains, for a sum waits for the one before it.
+    Fan<N_VALUES, GRADIENT, {{ layers[0][1] }}> even;
+    Fan<N_VALUES, GRADIENT, {{ layers[0][1] }}> odd;
+    even.set(0.0);
+    odd.set(0.0);
+    for (int j = 0; j < {{ layers[0][1] }}; j += 2) {
+      even.add(inward() + N_COLUMNS * j + 4 * FIRST, back_1 + j);
+      odd.add(inward() + N_COLUMNS * (j + 1) + 4 * FIRST, back_1 + j + 1);
+    }
+    double half[N_VALUES * 4 * GRADIENT + 1];
+    even.put(slope, 4 * GRADIENT);
+    odd.put(half, 4 * GRADIENT);
+    for (int i = 0; i < N_VALUES * 4 * GRADIENT; ++i) slope[i] += half[i];
   }
-  double half[N_VALUES * 4 * GRADIENT + 1];
-  even.put(slope, 4 * GRADIENT);
-  odd.put(half, 4 * GRADIENT);
-  for (int i = 0; i < N_VALUES * 4 * GRADIENT; ++i) slope[i] += half[i];
 }
 

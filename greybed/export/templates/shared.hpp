@@ -32,9 +32,10 @@ namespace greybed {
 
 /// What a guarded call does outside of the training data, or of the range of a marker.
 enum class Policy {
-  clamp,     ///< the closure at the nearest place that it knows
+  clamp,  ///< the closure at the nearest place that it knows
   baseline,  ///< exactly the law without the learnt part
-  abort      ///< nothing: results are NaN, and the host is to stop
+  abort,     ///< nothing: results are NaN, and the host is to stop
+  extrapolate  ///< the closure as it is, and the count
 };
 
 /// What a guarded call did.
@@ -42,7 +43,8 @@ enum class Status {
   inside = 0,    ///< the closure as it is
   clamped = 1,   ///< outside, policy clamp
   baseline = 2,  ///< outside, policy baseline
-  refused = 3    ///< outside, policy abort; or a number that makes no sense: results are NaN
+  refused = 3,   ///< outside, policy abort; or a number that makes no sense: results are NaN
+  extrapolated = 4  ///< outside, policy extrapolate
 };
 
 /// Policy and counts. The host owns it, one for each thread, and sums them up with add.

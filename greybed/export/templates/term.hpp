@@ -76,6 +76,10 @@ GREYBED_DEVICE inline Status eval_grad(const Inputs& in, Guard& guard, Outputs& 
     out.factor = 1.0;
     return Status::baseline;
   }
+  if (guard.policy == Policy::extrapolate) {
+    out.factor = eval_grad(z, out.gradient);
+    return Status::extrapolated;
+  }
   out.factor = eval(z < {{ low }} ? {{ low }} : {{ high }});
   return Status::clamped;
 }
