@@ -77,33 +77,17 @@ def _exported(closure: Closure, target: str, folder: Path) -> dict[str, Any]:
     from greybed.closures import FilteredDragClosure
     from greybed.closures.drag.filtered import limits as drag_limits
     from greybed.closures.viewfactor.limits import check_limits
-    from greybed.export import (
-        CompiledClosure,
-        CompiledDrag,
-        OnnxClosure,
-        OnnxDrag,
-        compile_cpp,
-        export_cpp,
-        export_drag_cpp,
-        export_drag_onnx,
-        export_onnx,
-    )
+    from greybed.export import CompiledClosure, OnnxClosure, compile_cpp, export_cpp, export_onnx
     from greybed.export.replay import CPP_TOLERANCE, ONNX_TOLERANCE, replay
 
-    form: CompiledClosure | OnnxClosure | CompiledDrag | OnnxDrag
-    tolerance = CPP_TOLERANCE if target == "cpp" else ONNX_TOLERANCE
-    if isinstance(closure, FilteredDragClosure):
-        if target == "cpp":
-            form = CompiledDrag(compile_cpp(export_drag_cpp(closure, folder), folder))
-        else:
-            form = OnnxDrag(export_drag_onnx(closure, folder / "closure.onnx"))
-        rows = replay(closure, form, tolerance)
-        return {"cases": drag_limits.check_limits(closure, form.predict), "rows": rows}
+    form: CompiledClosure | OnnxClosure
     if target == "cpp":
         form = CompiledClosure(compile_cpp(export_cpp(closure, folder), folder))
     else:
         form = OnnxClosure(export_onnx(closure, folder / "closure.onnx"))
-    rows = replay(closure, form, tolerance)
+    rows = replay(closure, form, CPP_TOLERANCE if target == "cpp" else ONNX_TOLERANCE)
+    if isinstance(closure, FilteredDragClosure):
+        return {"cases": drag_limits.check_limits(closure, form.predict), "rows": rows}
     return {"cases": check_limits(closure, evaluate=form.evaluate), "rows": rows}
 
 
