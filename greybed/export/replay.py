@@ -51,6 +51,29 @@ def find_compiler() -> list[str] | None:
     return None
 
 
+def found_compiler() -> list[str]:
+    """The same; an InputError where there is none."""
+    compiler = find_compiler()
+    if compiler is None:
+        raise InputError(
+            f"no C++ compiler found (CXX = {os.environ.get('CXX', '')!r}, g++, clang++, c++); "
+            "install one or set CXX to its path."
+        )
+    return compiler
+
+
+def run_compiler(compiler: Sequence[str], words: Sequence[str], source: Path) -> None:
+    """Compile; a VerificationError with the first complaint where the compiler refuses."""
+    done = subprocess.run([*compiler, *words], capture_output=True, text=True)
+    if done.returncode:
+        lines = [x for x in done.stderr.splitlines() if "error" in x.lower()] or [done.stderr]
+        flags = " ".join(word for word in words if word.startswith("-"))
+        raise VerificationError(
+            f"{source}: {compiler[0]} {flags} refuses it: {lines[0].strip()}; "
+            "try other flags or another compiler in CXX."
+        )
+
+
 def compile_cpp(
     header: str | os.PathLike[str],
     folder: str | os.PathLike[str],
@@ -78,29 +101,18 @@ def compile_cpp(
     VerificationError
         If the compiler refuses the header.
     """
-    compiler = find_compiler()
-    if compiler is None:
-        raise InputError(
-            f"no C++ compiler found (CXX = {os.environ.get('CXX', '')!r}, g++, clang++, c++); "
-            "install one or set CXX to its path."
-        )
+    compiler = found_compiler()
     source = Path(header).resolve()
     source = source.with_name(f"{source.stem}_test.cpp")
     program = output_folder(folder).resolve() / source.stem
-    command = [*compiler, *flags, str(source), "-o", str(program)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode:
-        lines = [line for line in done.stderr.splitlines() if "error" in line] or [done.stderr]
-        raise VerificationError(
-            f"{source}: {compiler[0]} {' '.join(flags)} refuses it: {lines[0].strip()}; "
-            "try other flags or another compiler in CXX."
-        )
+    run_compiler(compiler, [*flags, str(source), "-o", str(program)], source)
     return program
 
 
-def _flat(
+def flat(
     names: tuple[str, ...], markers: Mapping[str, ArrayLike]
 ) -> tuple[list[Array], tuple[int, ...]]:
+    """Columns of the markers, and the shape that they had."""
     if set(names) != set(markers):
         raise RangeError(
             f"this closure takes the markers {', '.join(names)}, not "
@@ -110,7 +122,7 @@ def _flat(
     return [np.ascontiguousarray(a).ravel() for a in arrays], arrays[0].shape
 
 
-def _prediction(names: Sequence[str], columns: Sequence[NDArray]) -> Any:
+def named_prediction(names: Sequence[str], columns: Sequence[NDArray]) -> Any:
     """Answers under the names that the closure itself gives them; extrapolation comes last."""
     if names[0] == "kept_along":
         return DragPrediction(*columns)
@@ -119,7 +131,7 @@ def _prediction(names: Sequence[str], columns: Sequence[NDArray]) -> Any:
     return tuple(columns)  # of a term
 
 
-def _filled(names: tuple[str, ...], markers: Mapping[str, ArrayLike]) -> Mapping[str, ArrayLike]:
+def filled(names: tuple[str, ...], markers: Mapping[str, ArrayLike]) -> Mapping[str, ArrayLike]:
     """Markers with parcels of single particles where none are given."""
     return {"parcels": 1.0, **markers} if "parcels" in names else markers
 
@@ -165,14 +177,14 @@ class CompiledClosure:
 
     def predict(self, **markers: ArrayLike) -> Any:
         """What the closure's own ``predict`` gives; all rows in one call of the program."""
-        columns, shape = _flat(self.marker_names, _filled(self.marker_names, markers))
+        columns, shape = flat(self.marker_names, filled(self.marker_names, markers))
         table = self._lines("rows", np.stack(columns, axis=1), len(self.outputs) + 1)
         values = [table[:, k].reshape(shape) for k in range(len(self.outputs))]
-        return _prediction(self.outputs, [*values, (table[:, -1] > 0.0).reshape(shape)])
+        return named_prediction(self.outputs, [*values, (table[:, -1] > 0.0).reshape(shape)])
 
     def gradients(self, **markers: ArrayLike) -> tuple[Array, Array]:
         """Answers (n, k) of ``eval_grad`` and their derivatives (n, k, n_markers)."""
-        columns, _ = _flat(self.marker_names, _filled(self.marker_names, markers))
+        columns, _ = flat(self.marker_names, filled(self.marker_names, markers))
         n, m = max(1, sum(o != "stderr" for o in self.outputs)), len(self.marker_names)
         table = self._lines("grad", np.stack(columns, axis=1), n * (1 + m) + 1)
         return table[:, :n], table[:, n:-1].reshape(-1, n, m)
@@ -277,11 +289,11 @@ class OnnxClosure:
 
     def predict(self, **markers: ArrayLike) -> Any:
         """What the closure's own ``predict`` gives."""
-        columns, shape = _flat(self.marker_names, _filled(self.marker_names, markers))
+        columns, shape = flat(self.marker_names, filled(self.marker_names, markers))
         columns = [column.astype(self._type) for column in columns]
         feed = dict(zip(self.marker_names, columns, strict=True))
         found = self._session.run(self._outputs, feed)
-        return _prediction(self._outputs, [np.reshape(result, shape) for result in found])
+        return named_prediction(self._outputs, [np.reshape(result, shape) for result in found])
 
 
 def relative_error(value: Array, expected: Array) -> Array:
