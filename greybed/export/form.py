@@ -8,7 +8,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from greybed.closures.viewfactor.visibility import Marker
+from greybed.closures.markers import Marker
 from greybed.export.metadata import Quantity
 from greybed.export.tables import Table
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from greybed.closures.markers import Marker
 from greybed.closures.predictors import Forest, Network, Predictor
 from greybed.closures.viewfactor.closure import Domain
-from greybed.closures.viewfactor.visibility import Marker
 
 ML_DOMAIN = "ai.onnx.ml"
 

@@ -7,8 +7,8 @@ import re
 import numpy as np
 
 from greybed._version import __version__
+from greybed.closures.markers import Marker
 from greybed.closures.term import GreyBoxTerm
-from greybed.closures.viewfactor.visibility import Marker
 from greybed.export.form import Field, Form
 from greybed.export.metadata import LICENCE, Quantity, cited
 
