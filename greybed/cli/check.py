@@ -15,13 +15,21 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from greybed.cli.export import targets
-
 if TYPE_CHECKING:
     from pathlib import Path
 
     from greybed.closures.artifact import Closure
     from greybed.closures.viewfactor.limits import LimitCase
+
+
+def targets(text: str) -> tuple[str, ...]:
+    """Read a list of the exported forms that are checked."""
+    words = tuple(dict.fromkeys(word.strip() for word in text.split(",")))
+    if not words or not set(words) <= {"cpp", "onnx"}:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} must be one or more of cpp, onnx, with commas between"
+        )
+    return words
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

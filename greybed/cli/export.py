@@ -3,9 +3,11 @@
 Examples:
   greybed export bed.closure --to cpp --out runs/host
   greybed export bed.closure --to cpp,onnx --name bed_radiation --out runs/host
+  greybed export bed.closure --to cpp,c,fortran,onnx --out runs/host
 
-cpp: NAME.hpp (one header, C++11), NAME_test.cpp, CMakeLists.txt, README.md; onnx: NAME.onnx in
-double precision; onnx32: NAME_f32.onnx in single precision.
+cpp: NAME.hpp (one header, C++11), NAME_test.cpp, CMakeLists.txt, README.md; c: also NAME_c.h and
+NAME_c.cpp for libNAME.so; fortran: also the module NAME.f90; onnx: NAME.onnx in double precision;
+onnx32: NAME_f32.onnx in single precision.
 Without a C++ compiler the header is written unreplayed, and says so. summary.json holds the
 errors. The exit code is 1, and nothing is written, where a golden row fails.
 """
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
     from greybed.closures.artifact import Closure
     from greybed.closures.term import GreyBoxTerm
 
-TARGETS = ("cpp", "onnx", "onnx32")
+TARGETS = ("cpp", "c", "fortran", "onnx", "onnx32")
 
 
 def targets(text: str) -> tuple[str, ...]:
@@ -81,6 +83,8 @@ def _replayed(
         file = folder / f"{word}{'_f32' if single else ''}.onnx"
         graph = export_onnx(subject, file, word, single=single)
         return replay(subject, OnnxClosure(graph), SINGLE_TOLERANCE if single else ONNX_TOLERANCE)
+    if target in ("c", "fortran"):
+        return _library(subject, target, folder, word)
     header = export_cpp(subject, folder, word)
     compiler = find_compiler()
     if compiler is None:
@@ -88,6 +92,36 @@ def _replayed(
     with tempfile.TemporaryDirectory() as build:
         program = CompiledClosure(compile_cpp(header, build))
         return {**replay(subject, program, CPP_TOLERANCE), "compiler": " ".join(compiler)}
+
+
+def _library(
+    subject: Closure | GreyBoxTerm, target: str, folder: Path, word: str
+) -> dict[str, Any]:
+    """The same for the C library, or for the Fortran module that calls it."""
+    import tempfile
+
+    from greybed.export import (
+        CompiledLibrary,
+        FortranProgram,
+        compile_c,
+        export_c,
+        find_compiler,
+        find_fortran,
+        form_of,
+    )
+    from greybed.export.replay import CPP_TOLERANCE, replay
+
+    header = export_c(subject, folder, word, fortran=target == "fortran")
+    if find_compiler() is None:
+        return {"passed": None, "reason": "no C++ compiler found: install one or set CXX"}
+    if target == "fortran" and find_fortran() is None:
+        return {"passed": None, "reason": "no Fortran compiler found: install gfortran or set FC"}
+    form = form_of(subject, word)
+    with tempfile.TemporaryDirectory() as build:
+        library = compile_c(header, build)
+        if target == "c":
+            return replay(subject, CompiledLibrary(library, form), CPP_TOLERANCE)
+        return replay(subject, FortranProgram(header, library, form), CPP_TOLERANCE)
 
 
 def run(options: argparse.Namespace) -> int:

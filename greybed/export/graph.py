@@ -173,7 +173,7 @@ def outside_nodes(g: Graph, domain: Domain, features: str) -> str:
     beyond = g.add(
         "Or", g.add("Less", features, domain.low), g.add("Greater", features, domain.high)
     )
-    count = g.sum_columns(g.add("Cast", beyond, to=11))
+    count = g.sum_columns(g.add("Cast", beyond, to=1 if g.single else 11))
     away = g.add("Sub", features, domain.centre)
     distance2 = g.sum_columns(g.add("Mul", g.add("MatMul", away, domain.precision), away))
     far = g.add("Greater", distance2, float(domain.limit) ** 2)

@@ -112,6 +112,8 @@ def context_of(form: Form) -> dict[str, Any]:
         "n_answers": form.n_answers,
         "inputs": form.inputs,
         "n_inputs": len(form.inputs),
+        # Numbers of one place: those of the material stand before them, and are made once.
+        "flat": form.inputs[form.context.get("n_before", 0) :],
         "allowed": allowed,
         "body": form.body,
         "tables": form.tables,
@@ -129,6 +131,14 @@ def write_templates(form: Form, folder: Path, files: dict[str, str]) -> None:
         text = environment().get_template(template).render(context)
         with atomic_path(folder / file) as temporary:
             temporary.write_text(text, encoding="ascii")
+
+
+HEADER_FILES = {
+    "{}.hpp": "header.hpp",
+    "{}_test.cpp": "test.cpp",
+    "README.md": "README.md",
+    "CMakeLists.txt": "CMakeLists.txt",
+}
 
 
 def export_cpp(
@@ -164,11 +174,5 @@ def export_cpp(
     """
     form = form_of(subject, name)
     target = output_folder(folder)
-    files = {
-        f"{form.name}.hpp": "header.hpp",
-        f"{form.name}_test.cpp": "test.cpp",
-        "README.md": "README.md",
-        "CMakeLists.txt": "CMakeLists.txt",
-    }
-    write_templates(form, target, files)
+    write_templates(form, target, {k.format(form.name): v for k, v in HEADER_FILES.items()})
     return target / f"{form.name}.hpp"

@@ -144,7 +144,7 @@ def test_markers_out_of_range_give_nan(which, form):
     columns = {name: np.full(len(wrong) + 1, value) for name, value in sound.items()}
     for row, (name, value) in enumerate(wrong):
         columns[name][row] = value
-    for name in (UNTRAINED[0], FITTED[0]):
+    for name in (FITTED[0], "forest pencil 3") if which == "onnx" else (FITTED[0],):
         answer = form(name, which).predict(**columns)
         assert np.isnan(answer.view_factor).tolist() == [True] * len(wrong) + [False]
         assert np.isnan(answer.stderr).tolist() == [True] * len(wrong) + [False]

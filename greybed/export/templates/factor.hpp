@@ -329,14 +329,14 @@ GREYBED_DEVICE inline bool in_domain({{ typed }}) {
 }
 
 /// Physical numbers of one place.
-struct Inputs {
+struct GREYBED_TYPE Inputs {
 {% for field in inputs %}
   double {{ field.name }};  ///< {{ field.meaning }} [{{ field.unit }}]
 {% endfor %}
 };
 
 /// What a guarded call gives.
-struct Outputs {
+struct GREYBED_TYPE Outputs {
   double {{ answer }};  ///< [-]
   double gradient[{{ inputs|length }}];  ///< by eval_grad: its derivatives for the Inputs in their order [1 / their unit]
 };

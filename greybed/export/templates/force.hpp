@@ -1,6 +1,6 @@
 {# Filtered drag: from physical numbers to a force and its derivative. #}
 /// Particles of one size in a gas under gravity, and what filtered drag is scaled with; SI.
-struct Material {
+struct GREYBED_TYPE Material {
   double diameter_m;
   double gas_viscosity_pa_s;
   double gas_weight_n_m3;       ///< rho_g g
@@ -63,7 +63,7 @@ GREYBED_DEVICE inline Material material(double diameter_m, double particle_densi
 }
 
 /// Physical numbers of one place: the fields of the coarse grid, SI.
-struct Inputs {
+struct GREYBED_TYPE Inputs {
   double solid_fraction;                ///< [-]
   double gas_velocity_m_s[3];
   double particle_velocity_m_s[3];
@@ -73,13 +73,13 @@ struct Inputs {
 };
 
 /// A drag law at these fields: beta = 18 mu eps phi F / d^2, Re = eps rho_g d |slip| / mu.
-struct Law {
+struct GREYBED_TYPE Law {
   double factor;  ///< F [-]
   double steep;   ///< Re dF/dRe [-]
 };
 
 /// What a guarded call gives: the drag on the particles in a unit volume of gas and particles.
-struct Outputs {
+struct GREYBED_TYPE Outputs {
   double force_n_m3[3];
   double derivative_n_s_m4[9];  ///< by eval_grad: [3 i + j] = dF_i / dslip_j
   double exchange_kg_m3_s;      ///< F.slip / slip^2, the coefficient for a host that takes one

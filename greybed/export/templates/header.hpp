@@ -111,4 +111,10 @@ inline int self_test() {
 }  // namespace {{ name }}
 }  // namespace greybed
 
+#ifdef GREYBED_HIDES
+#pragma GCC visibility pop
+#undef GREYBED_HIDES
+#endif
+#undef GREYBED_TYPE
+
 #endif

@@ -127,7 +127,7 @@ GREYBED_HOT void reduced(const Two<L>& x, Two<L>& r, Two<L>& power) {
   reduced(x.b, r.b, power.b);
 }
 
-#if defined(GREYBED_VECTORS) && defined(__AVX__)
+#if defined(GREYBED_VECTORS) && (defined(__AVX__) || defined(GREYBED_AVX2))
 typedef __m256d v4;
 GREYBED_HOT void load(const double* p, v4& v) { v = _mm256_loadu_pd(p); }
 GREYBED_HOT void store(const v4& v, double* p) { _mm256_storeu_pd(p, v); }
@@ -152,7 +152,7 @@ GREYBED_HOT void reduced(const v4& x, v4& r, v4& power) {
   hide(k);
   r = (x - k * _mm256_set1_pd(0.693147180369123816490)) -
       k * _mm256_set1_pd(1.90821492927058770002e-10);
-#if defined(__AVX2__)
+#if defined(__AVX2__) || defined(GREYBED_AVX2)
   power = _mm256_castsi256_pd(_mm256_slli_epi64(
       _mm256_add_epi64(_mm256_castpd_si256(t), _mm256_set1_epi64x(1023)), 52));
 #else

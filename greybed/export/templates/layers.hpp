@@ -71,7 +71,7 @@ struct Sums<0> {
 };
 
 // Sums of this many blocks at once fit the registers.
-#if defined(__AVX__)
+#if defined(__AVX__) || defined(GREYBED_AVX2)
 constexpr int TOGETHER = 8;
 #else
 constexpr int TOGETHER = 4;

@@ -9,6 +9,16 @@
 #include <emmintrin.h>
 #endif
 
+// Functions and constants stay inside the library that they are compiled into: two plug-ins with
+// closures of one name, but other weights, would share them else. Types may cross.
+#if (defined(__clang__) || defined(__GNUC__)) && !defined(_WIN32) && !defined(__CUDACC__)
+#define GREYBED_HIDES 1
+#define GREYBED_TYPE __attribute__((visibility("default")))
+#pragma GCC visibility push(hidden)
+#else
+#define GREYBED_TYPE
+#endif
+
 #ifndef GREYBED_SHARED_1
 #define GREYBED_SHARED_1
 
@@ -31,7 +41,7 @@
 namespace greybed {
 
 /// What a guarded call does outside of the training data, or of the range of a marker.
-enum class Policy {
+enum class GREYBED_TYPE Policy {
   clamp,  ///< the closure at the nearest place that it knows
   baseline,  ///< exactly the law without the learnt part
   abort,     ///< nothing: results are NaN, and the host is to stop
@@ -39,7 +49,7 @@ enum class Policy {
 };
 
 /// What a guarded call did.
-enum class Status {
+enum class GREYBED_TYPE Status {
   inside = 0,    ///< the closure as it is
   clamped = 1,   ///< outside, policy clamp
   baseline = 2,  ///< outside, policy baseline
@@ -48,7 +58,7 @@ enum class Status {
 };
 
 /// Policy and counts. The host owns it, one for each thread, and sums them up with add.
-struct Guard {
+struct GREYBED_TYPE Guard {
   Policy policy;
   std::uint64_t calls;
   std::uint64_t outside;  ///< calls outside, whatever was done

@@ -46,12 +46,12 @@ GREYBED_DEVICE inline void predict(double {{ z }}, double& factor, bool& extrapo
 }
 
 /// Physical numbers of one place.
-struct Inputs {
+struct GREYBED_TYPE Inputs {
   double {{ inputs[0].name }};  ///< {{ inputs[0].meaning }} [{{ unit }}]
 };
 
 /// What a guarded call gives.
-struct Outputs {
+struct GREYBED_TYPE Outputs {
   double factor;       ///< [-]
   double gradient[1];  ///< by eval_grad [1 / unit]
 };
