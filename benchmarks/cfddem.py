@@ -3,7 +3,8 @@
 python benchmarks/cfddem.py [--time 0.004] [--overhead]
 
 The bed of examples/fluidised_bed in flow: 9,240 spheres, 12 x 1 x 26 cells, after 0.3 s of air at
-0.66 m/s. Both start from the same places and velocities of spheres and gas, and get the same gas step
+0.66 m/s.
+Both start from the same places and velocities of spheres and gas, and get the same gas step
 (--step), density, size, stiffness and friction; DPMFoam takes its own law of contacts
 (pairSpringSliderDashpot, 12 steps for a contact); both take Ergun and Wen & Yu's drag. Compiling,
 reading and the way to the start are not in the clock. Times are of the processor, so that other
@@ -115,8 +116,9 @@ def field(name: str, dimensions: str, values: np.ndarray, rims: str) -> str:
     body = "\n".join(rows)
     return dictionary(
         name,
-        f"dimensions {dimensions};\ninternalField nonuniform List<{kind}>\n{len(rows)}\n(\n{body}\n)"
-        f";\nboundaryField {{ {rims} }}",
+        f"dimensions {dimensions};\n"
+        f"internalField nonuniform List<{kind}>\n{len(rows)}\n(\n{body}\n);"
+        f"\nboundaryField {{ {rims} }}",
         f"vol{kind.title()}Field",
     )
 
@@ -224,7 +226,7 @@ def theirs(both: GasParticles, gas_step: float, span: float) -> dict[str, float]
     with tempfile.TemporaryDirectory() as folder:
         case = Path(folder) / "case"
         write_case(case, both, gas_step)
-        run(case, "blockMesh && DPMFoam")
+        run(case, "blockMesh > mesh.log && DPMFoam")
         (first,) = (p for p in case.iterdir() if p.name.startswith("1e-"))
         shutil.copytree(first / "lagrangian", case / "0/lagrangian")
         shutil.rmtree(first)

@@ -153,8 +153,9 @@ def main() -> None:
                  *hidden]
             )  # fmt: skip
             file.flush()
+    spent = time.process_time() - started
     print(f"{path.name}: {len(simulation.radii)} spheres, {both.time:.2f} s simulated, "
-          f"{time.process_time() - started:.0f} s of the processor, seen: {seen.tolist()}")  # fmt: skip
+          f"{spent:.0f} s of the processor, seen: {seen.tolist()}")  # fmt: skip
 
 
 if __name__ == "__main__":
