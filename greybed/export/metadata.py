@@ -9,7 +9,7 @@ from math import isinf
 from greybed._version import __version__
 from greybed.closures import content_hash
 from greybed.closures.artifact import Closure
-from greybed.closures.viewfactor.visibility import Marker
+from greybed.closures.markers import Marker
 from greybed.core import InputError
 
 LICENCE = "BSD-3-Clause"

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from greybed.closures import ViewFactorClosure
 from greybed.closures.artifact import Closure
+from greybed.closures.markers import Marker
 from greybed.closures.predictors import Forest, Network
 from greybed.closures.viewfactor.closure import Domain
-from greybed.closures.viewfactor.visibility import ODDS_BOUND, SPREAD_BOUND, Marker
+from greybed.closures.viewfactor.visibility import ODDS_BOUND, SPREAD_BOUND
 from greybed.core import InputError
 from greybed.core.exact import TOUCHING, quadrature
 from greybed.core.files import atomic_path
