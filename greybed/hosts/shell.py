@@ -11,6 +11,9 @@ from pathlib import Path
 
 from greybed.core.errors import InputError
 
+# In a line by which compilers, LAMMPS, LIGGGHTS or OpenFOAM say why they stop.
+_TELLING = ("error:", "ERROR", "FATAL")
+
 
 def run_command(
     words: Sequence[str | Path],
@@ -47,8 +50,8 @@ def said_in(log: Path) -> str:
     """The last line of a log that tells of an error, or its last line, and where the log is."""
     lines = [line.strip() for line in log.read_text(errors="replace").splitlines()[1:]]
     lines = [line for line in lines if line]
-    told = [line for line in lines if "error" in line.lower() or "ERROR" in line]
-    last = (told or lines or ["it said nothing"])[-1 if not told else 0]
+    told = [line for line in lines if any(word in line for word in _TELLING)]
+    last = told[0] if told else (lines or ["it said nothing"])[-1]
     return f"{last[:300]}; the log is {log}."
 
 
