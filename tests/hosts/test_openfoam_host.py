@@ -96,8 +96,8 @@ def test_two_fluids_use_the_closure_where_it_was_trained(adapter, tmp_path):
         gas, solids = (end_of(tmp_path / name, f"U.{phase}") for phase in ("air", "particles"))
         # The lower half of the cells holds the bed; sides follow the cells in the file.
         slips.append(np.abs((gas[:3000] - solids[:3000])[:, 1]).mean())
-    # Less of the drag is kept, so gas passes the particles faster.
-    assert slips[0] > 1.2 * slips[1]
+    # Less of the drag is kept but where the law stays, so gas passes the particles faster.
+    assert slips[0] > 1.1 * slips[1]
 
 
 def test_models_of_radiation_are_refused(tmp_path):
