@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from greybed._version import __version__
-from greybed.closures.drag.filtered.closure import FilteredDragClosure
 from greybed.closures.viewfactor.markers import N_LINES, RIM, pencil_lines
 from greybed.core.exact import quadrature
 from greybed.core.files import atomic_path, output_folder
-from greybed.export import export_cpp, export_drag_cpp
+from greybed.export import export_cpp
 from greybed.export.metadata import LICENCE
 from greybed.hosts.model import RADIATION, HostModel
 
@@ -89,10 +88,7 @@ def write_adapter(
     """
     target = output_folder(folder)
     if model.closure is not None:
-        if isinstance(model.closure, FilteredDragClosure):
-            export_drag_cpp(model.closure, target, model.name)
-        else:
-            export_cpp(model.closure, target, model.name)
+        export_cpp(model.closure, target, model.name)
         # The exports' own test and build files are for programs that stand alone.
         for extra in (f"{model.name}_test.cpp", "CMakeLists.txt", "README.md"):
             (target / extra).unlink(missing_ok=True)
