@@ -32,6 +32,7 @@ name = "floor"
 kind = "plane"
 normal = [0, 0, 1]
 """
+DISC = CYLINDER.replace('kind = "plane"', 'kind = "disc"\npoint = [0.01, 0.01, 0]\nradius = 0.016')
 FUNNEL = """
 [[wall]]
 material = "steel"
@@ -78,7 +79,9 @@ def own(folder, text):
 
 @needs_lammps
 @pytest.mark.parametrize("normal", ["hertz", "linear"])
-@pytest.mark.parametrize("walls", [planes(), CYLINDER, FUNNEL], ids=["box", "cylinder", "funnel"])
+@pytest.mark.parametrize(
+    "walls", [planes(), CYLINDER, DISC, FUNNEL], ids=["box", "cylinder", "disc", "funnel"]
+)
 def test_smooth_spheres_go_the_same_way(tmp_path, normal, walls):
     """5,000 steps, some collisions each: the same normal law, but for rounding."""
     text = smooth(HEAD.format(**{**SOME, "normal": normal})) + walls + pack(10)
@@ -90,7 +93,8 @@ def test_smooth_spheres_go_the_same_way(tmp_path, normal, walls):
     # moves the end of a contact by a little; the rim of a cone is another in both. Planes, and
     # springs in cylinders, are the same to rounding.
     exact = walls == planes() or (normal == "linear" and walls == CYLINDER)
-    near = 1e-9 if exact else 0.02
+    thin = normal == "linear" and walls == DISC  # of a height of 1e-8 radii
+    near = 1e-9 if exact else 1e-5 if thin else 0.02
     assert apart(mine, theirs) < near
     for a, b in zip(mine.tally.history, theirs.tally.history, strict=True):
         assert a.keys() == b.keys()

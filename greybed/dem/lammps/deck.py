@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from greybed.core.errors import InputError
-from greybed.core.walls import Cone, Cylinder, Plane
+from greybed.core.walls import Cone, Cylinder, Disc, Plane
 from greybed.dem.case_tables import WallTable
 from greybed.dem.damping import damping
 from greybed.dem.lammps.limits import NORMAL
@@ -21,6 +21,8 @@ from greybed.dem.runner import ParticleRun
 DECK, LOG = "in.lammps", "log.lammps"
 FIELDS = "id type x y z vx vy vz omegax omegay omegaz radius mass c_touch"
 _SKIN = 0.25
+# Half the height over the radius of what stands for a disc.
+_THIN = 1e-8
 
 
 def deck_of(run: ParticleRun, extra: tuple[str, ...] = ()) -> Deck:
@@ -193,6 +195,8 @@ def _wall(run: ParticleRun, k: int, wall: WallTable, box: np.ndarray) -> list[st
     if isinstance(shape, Plane):
         region += "plane " + " ".join(f"{c!r}" for c in (*shape.point, *shape.normal))
         region += " units box"
+    elif isinstance(shape, Disc):
+        region += _disc(shape)
     else:
         assert isinstance(shape, Cylinder | Cone)
         region += _round(shape, box)
@@ -207,6 +211,17 @@ def _law_words(run: ParticleRun, kind: int, of_wall: str, contact: Contact | Non
     assert contact is not None  # the case has been checked
     materials = {material.name: material for material in run.simulation.materials}
     return _law(run, run.simulation.materials[kind], materials[of_wall], contact)
+
+
+def _disc(shape: Disc) -> str:
+    """A disc across an axis: a cylinder of almost no height, from without."""
+    axis = int(np.abs(shape.normal).argmax())
+    others = [float(shape.point[other]) for other in range(3) if other != axis]
+    half, at = _THIN * shape.radius, float(shape.point[axis])
+    return (
+        f"cylinder {'xyz'[axis]} {others[0]!r} {others[1]!r} {shape.radius!r} {at - half!r} "
+        f"{at + half!r} side out units box"
+    )
 
 
 def _round(shape: Cylinder | Cone, box: np.ndarray) -> str:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from greybed.core.errors import InputError
-from greybed.core.walls import Cone, Cylinder, Plane
+from greybed.core.walls import Cone, Cylinder, Disc, Plane
 from greybed.dem.case import ParticleCase
 from greybed.dem.case_tables import FileTable, PackTable, StreamTable
 from greybed.dem.measure_tables import ConductionTable, StressTable
@@ -61,9 +61,10 @@ def _check_walls(case: ParticleCase) -> None:
         if moves:
             raise _cannot(f"wall {wall.name!r}, which moves", _REMEDY)
         along = isinstance(shape, Cylinder | Cone) and max(np.abs(shape.axis)) == 1.0
-        if not (isinstance(shape, Plane) or along):
+        flat = isinstance(shape, Disc) and max(np.abs(shape.normal)) == 1.0
+        if not (isinstance(shape, Plane) or along or flat):
             raise _cannot(
-                f"wall {wall.name!r}, neither a plane nor a cylinder or cone along an axis",
+                f"wall {wall.name!r} (only planes, and cylinders, cones and discs along an axis)",
                 _REMEDY,
             )
 
