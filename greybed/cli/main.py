@@ -27,6 +27,8 @@ VERBS = {
     "train": ("train", "train a closure from a data set"),
     "check": ("check", "check a closure's limiting cases and golden rows"),
     "export": ("export", "export a closure to C++ or ONNX"),
+    "campaign": ("campaign", "run a case with many values, on one machine or a cluster"),
+    "host": ("host", "put a closure into LAMMPS, LIGGGHTS or OpenFOAM"),
     "simulate": ("simulate", "run a coupled case from a TOML file"),
     "diagnose": ("diagnose", "trace a residual to the effect that a model lacks"),
     "blindtest": ("blindtest", "test the residual analysis on sealed data sets"),
