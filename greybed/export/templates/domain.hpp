@@ -21,7 +21,7 @@ GREYBED_DEVICE inline double distance2(const double* features, double* away, dou
 GREYBED_DEVICE inline bool outside(const double* features) {
   bool box = false;
   for (int i = 0; i < N_FEATURES; ++i) {
-    box = box || features[i] < domain_low()[i] || features[i] > domain_high()[i];
+    box |= (features[i] < domain_low()[i]) | (features[i] > domain_high()[i]);
   }
   double away[N_FEATURES];
   double across[N_COLUMNS];
