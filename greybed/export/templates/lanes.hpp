@@ -33,17 +33,15 @@ GREYBED_HOT void spread(double x, double& v) { v = x; }
 GREYBED_HOT void add_product(double& sum, double x, double y) { sum += x * y; }
 GREYBED_HOT double root(double x) { return std::sqrt(x); }
 GREYBED_HOT double larger(double x, double y) { return x < y ? y : x; }
-GREYBED_HOT double magnitude(double x) { return std::fabs(x); }
-GREYBED_HOT double signed_as(double x, double sign) { return sign < 0.0 ? -x : x; }
+GREYBED_HOT double smaller(double x, double y) { return x < y ? x : y; }
 GREYBED_HOT double total(double v) { return v; }
-/// x = log(2) k + r with |r| <= log(2) / 2; power = 2^k. No step relies on the order of rounding.
-GREYBED_HOT void reduced(double x, double& r, double& power) {
-  const int k = static_cast<int>(x * 1.4426950408889634 + (x < 0.0 ? -0.5 : 0.5));
-  r = (x - k * 0.693147180369123816490) - k * 1.90821492927058770002e-10;
-  const std::uint64_t bits = static_cast<std::uint64_t>(k + 1023) << 52;
+/// The whole number k next to y, |y| < 1000, and power = 2^k. No step relies on the order of rounding.
+GREYBED_HOT void rounded(double y, double& k, double& power) {
+  const int whole = static_cast<int>(y + (y < 0.0 ? -0.5 : 0.5));
+  k = whole;
+  const std::uint64_t bits = static_cast<std::uint64_t>(whole + 1023) << 52;
   std::memcpy(&power, &bits, sizeof power);
 }
-
 /// x = 2^k z with sqrt(1/2) <= z < sqrt(2), for positive x that is not tiny.
 GREYBED_HOT void parted(double x, double& k, double& z) {
   std::uint64_t bits;
@@ -64,23 +62,16 @@ GREYBED_HOT void spread(double x, d2& v) { v = _mm_set1_pd(x); }
 GREYBED_HOT void add_product(d2& sum, const d2& x, const d2& y) { sum += x * y; }
 GREYBED_HOT d2 root(const d2& x) { return _mm_sqrt_pd(x); }
 GREYBED_HOT d2 larger(const d2& x, const d2& y) { return _mm_max_pd(x, y); }
-GREYBED_HOT d2 magnitude(const d2& x) {
-  return _mm_and_pd(x, _mm_castsi128_pd(_mm_set1_epi64x(0x7fffffffffffffffLL)));
-}
-GREYBED_HOT d2 signed_as(const d2& x, const d2& sign) {
-  const d2 mask = _mm_castsi128_pd(_mm_set1_epi64x(0x7fffffffffffffffLL));
-  return _mm_or_pd(x, _mm_andnot_pd(mask, sign));
-}
+GREYBED_HOT d2 smaller(const d2& x, const d2& y) { return _mm_min_pd(x, y); }
 /// A number that the compiler knows nothing of from here on.
 GREYBED_HOT void hide(d2& v) { __asm__("" : "+x"(v)); }
 GREYBED_HOT double total(const d2& v) { return v[0] + v[1]; }
-GREYBED_HOT void reduced(const d2& x, d2& r, d2& power) {
+GREYBED_HOT void rounded(const d2& y, d2& k, d2& power) {
   const d2 magic = _mm_set1_pd(6755399441055744.0);  // 1.5 * 2^52: adding it rounds
-  d2 t = x * _mm_set1_pd(1.4426950408889634) + magic;
-  hide(t);  // -ffast-math would put what was added and what is taken off together,
-  d2 k = t - magic;
-  hide(k);  // ... or share out the product
-  r = (x - k * _mm_set1_pd(0.693147180369123816490)) - k * _mm_set1_pd(1.90821492927058770002e-10);
+  d2 t = y + magic;
+  hide(t);  // -ffast-math would put what is added and what is taken off together,
+  k = t - magic;
+  hide(k);  // ... or share out a product
   power = _mm_castsi128_pd(
       _mm_slli_epi64(_mm_add_epi64(_mm_castpd_si128(t), _mm_set1_epi64x(1023)), 52));
 }
@@ -108,23 +99,15 @@ GREYBED_HOT void spread(double x, d4& v) { v = _mm256_set1_pd(x); }
 GREYBED_HOT void add_product(d4& sum, const d4& x, const d4& y) { sum += x * y; }
 GREYBED_HOT d4 root(const d4& x) { return _mm256_sqrt_pd(x); }
 GREYBED_HOT d4 larger(const d4& x, const d4& y) { return _mm256_max_pd(x, y); }
-GREYBED_HOT d4 magnitude(const d4& x) {
-  return _mm256_and_pd(x, _mm256_castsi256_pd(_mm256_set1_epi64x(0x7fffffffffffffffLL)));
-}
-GREYBED_HOT d4 signed_as(const d4& x, const d4& sign) {
-  const d4 mask = _mm256_castsi256_pd(_mm256_set1_epi64x(0x7fffffffffffffffLL));
-  return _mm256_or_pd(x, _mm256_andnot_pd(mask, sign));
-}
+GREYBED_HOT d4 smaller(const d4& x, const d4& y) { return _mm256_min_pd(x, y); }
 GREYBED_HOT void hide(d4& v) { __asm__("" : "+x"(v)); }
 GREYBED_HOT double total(const d4& v) { return (v[0] + v[1]) + (v[2] + v[3]); }
-GREYBED_HOT void reduced(const d4& x, d4& r, d4& power) {
+GREYBED_HOT void rounded(const d4& y, d4& k, d4& power) {
   const d4 magic = _mm256_set1_pd(6755399441055744.0);
-  d4 t = x * _mm256_set1_pd(1.4426950408889634) + magic;
+  d4 t = y + magic;
   hide(t);
-  d4 k = t - magic;
+  k = t - magic;
   hide(k);
-  r = (x - k * _mm256_set1_pd(0.693147180369123816490)) -
-      k * _mm256_set1_pd(1.90821492927058770002e-10);
 #if defined(__AVX2__) || defined(GREYBED_AVX2)
   power = _mm256_castsi256_pd(_mm256_slli_epi64(
       _mm256_add_epi64(_mm256_castpd_si256(t), _mm256_set1_epi64x(1023)), 52));
@@ -180,13 +163,8 @@ GREYBED_HOT Two<L> larger(const Two<L>& x, const Two<L>& y) {
   return r;
 }
 template <class L>
-GREYBED_HOT Two<L> magnitude(const Two<L>& x) {
-  const Two<L> r = {magnitude(x.a), magnitude(x.b)};
-  return r;
-}
-template <class L>
-GREYBED_HOT Two<L> signed_as(const Two<L>& x, const Two<L>& sign) {
-  const Two<L> r = {signed_as(x.a, sign.a), signed_as(x.b, sign.b)};
+GREYBED_HOT Two<L> smaller(const Two<L>& x, const Two<L>& y) {
+  const Two<L> r = {smaller(x.a, y.a), smaller(x.b, y.b)};
   return r;
 }
 template <class L>
@@ -194,9 +172,9 @@ GREYBED_HOT double total(const Two<L>& v) {
   return total(v.a) + total(v.b);
 }
 template <class L>
-GREYBED_HOT void reduced(const Two<L>& x, Two<L>& r, Two<L>& power) {
-  reduced(x.a, r.a, power.a);
-  reduced(x.b, r.b, power.b);
+GREYBED_HOT void rounded(const Two<L>& y, Two<L>& k, Two<L>& power) {
+  rounded(y.a, k.a, power.a);
+  rounded(y.b, k.b, power.b);
 }
 
 template <class L>
