@@ -51,8 +51,8 @@ def checked_markers(known: Sequence[Marker], given: Mapping[str, ArrayLike]) -> 
     if missing or unknown:
         raise RangeError(
             f"this closure takes the markers {', '.join(names)}; missing: "
-            f"{', '.join(missing) or 'none'}, unknown: {', '.join(unknown) or 'none'}: give those, or "
-            "take a closure with other markers."
+            f"{', '.join(missing) or 'none'}, unknown: {', '.join(unknown) or 'none'}: give those, "
+            "or take a closure with other markers."
         )
     arrays = np.broadcast_arrays(*(np.asarray(given[name], dtype=np.float64) for name in names))
     for marker, value in zip(known, arrays, strict=True):
