@@ -8,6 +8,7 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 from subprocess import Popen
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +56,7 @@ class LiggghtsRun:
         For what LIGGGHTS cannot do, programs that are missing, and what our own engine refuses.
     """
 
-    heat = None
+    heat: Any = None
     engine, deck_name, log_name, version_head = "LIGGGHTS", DECK, LOG, "LIGGGHTS ("
     dumps = ".bin"
 
