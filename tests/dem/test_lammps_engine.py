@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from liggghts_cases import HEAD, SOME, apart, pack, planes
 
+from greybed.cli.main import main
 from greybed.core.errors import InputError
 from greybed.dem.case import load_particle_case
 from greybed.dem.lammps import LammpsRun, process
@@ -158,6 +159,21 @@ def test_what_the_deck_does_not_carry_is_refused_by_name(tmp_path, old, new, sai
     path.write_text(text.replace(old, new))
     with pytest.raises(InputError, match=said):
         check(load_particle_case(path))
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--fix", "viscous 1"], "are for --engine liggghts or lammps"),
+        (["--engine", "lammps", "--fix", "viscous 1"], "--fix needs the plugin"),
+        (["--engine", "liggghts", "--plugin", "nowhere"], "is no program"),
+    ],
+)
+def test_plugins_without_their_engine_are_refused(tmp_path, capsys, words, said):
+    path = tmp_path / "case.toml"
+    path.write_text(HEAD.format(**SOME) + planes() + pack(3))
+    assert main(["simulate", str(path), "--out", str(tmp_path / "out"), *words]) == 2
+    assert said in capsys.readouterr().err
 
 
 def test_lammps_that_is_missing_is_named(monkeypatch, tmp_path):

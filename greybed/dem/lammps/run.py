@@ -67,12 +67,8 @@ class LammpsRun(LiggghtsRun):
         plugin: Path | None = None,
         fixes: tuple[str, ...] = (),
     ) -> None:
-        self._extra: tuple[str, ...] = ()
-        if plugin is not None:
-            self._extra = (f"plugin load {plugin.resolve()}",)
-        self._extra += tuple(f"fix host_{k} all {fix}" for k, fix in enumerate(fixes))
         self._capacity: Array | None = None
-        super().__init__(case, packings, folder, ranks=ranks)
+        super().__init__(case, packings, folder, ranks=ranks, plugin=plugin, fixes=fixes)
         if self._capacity is not None:
             rows = np.column_stack([self.simulation.rows, self._temperatures])
             self.simulation = replace(self.simulation, rows=rows)
@@ -88,7 +84,8 @@ class LammpsRun(LiggghtsRun):
     def _deck(self, start: ParticleRun) -> Deck:
         if start.heat is not None:
             self._capacity, self._temperatures = start.heat._capacity, start.heat.temperatures
-        return deck_of(start, self._extra)
+        loads = () if self._plugin is None else (f"plugin load {self._plugin}",)
+        return deck_of(start, (*loads, *self._fixes))
 
     def _started(self) -> AbstractContextManager[Popen[str]]:
         return started(self.words, self.folder, needed_lammps().environment)
