@@ -58,11 +58,13 @@ def particles(threads: int | None = None) -> Simulation:
     )
 
 
-def with_gas(simulation: Simulation, drag: str = "bvk", speed: float = SPEED) -> GasParticles:
+def with_gas(
+    simulation: Simulation, drag: str = "bvk", speed: float = SPEED, budget: bool = False
+) -> GasParticles:
     """The same with air from below."""
     slip = Wall(slip=True)
     sides = {"z-": Inflow(speed), "z+": Outlet(), "x-": slip, "x+": slip}
-    gas = GasSolver(Grid(cells=CELLS, upper=SIZE), sides, AIR)
+    gas = GasSolver(Grid(cells=CELLS, upper=SIZE), sides, AIR, budget=budget)
     return GasParticles(gas, simulation, Settings(drag=drag))
 
 

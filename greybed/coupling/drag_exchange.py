@@ -54,6 +54,11 @@ class Settings:
         Coefficient, 0.5 for spheres, 0 for none [-].
     lift : str
         ``none`` or ``saffman-mei``.
+    lubrication : float
+        Gap between surfaces within which films of the fluid act, in mean diameters; 0 for none.
+        See :func:`greybed.coupling.lubrication.lubrication` [-].
+    roughness : float
+        Films are no thinner than it, in mean diameters [-].
     correction : callable or FilteredDrag, optional
         ``H(phi, slip, size)`` for solid fractions (n,), slips (n, 3) and the edge of a cube of a
         cell's volume [m]: the fraction of drag that is kept. A
@@ -76,6 +81,8 @@ class Settings:
     buoyancy: bool = True
     added_mass: float = 0.0
     lift: str = "none"
+    lubrication: float = 0.0
+    roughness: float = 1e-3
     correction: Correction | FilteredDrag | None = None
 
     def __post_init__(self) -> None:
@@ -88,6 +95,7 @@ class Settings:
                 )
         for name, low, high in (
             ("width", 0.0, 1e3), ("least_void", 0.01, 0.99), ("added_mass", 0.0, 10.0),
+            ("lubrication", 0.0, 1.0), ("roughness", 1e-6, 0.1),
         ):  # fmt: skip
             value = getattr(self, name)
             if not (math.isfinite(value) and low <= value <= high):

@@ -16,6 +16,7 @@ from greybed.coupling.exchange_report import ExchangeReport
 from greybed.coupling.forces import added_mass, shear_lift, vorticity_of
 from greybed.coupling.gas import Faces, Gas, begin_with, cell_slopes, imposed_gradient
 from greybed.coupling.gas_heat import GasHeat
+from greybed.coupling.lubrication import lubrication
 from greybed.coupling.transfer import Transfer
 from greybed.coupling.void_fraction import Overlaps, Smoother
 from greybed.dem.simulation import Simulation
@@ -24,6 +25,8 @@ Array = NDArray[np.float64]
 
 # A gas step moves no particle further than this share of a cell.
 _SHARE_OF_CELL = 0.2
+# Nor two particles by more than this share of the film between them.
+_SHARE_OF_FILM = 0.1
 _NOTHING = np.zeros((0, 3))
 
 
@@ -75,8 +78,8 @@ class GasParticles:
                     f"along {name} the gas repeats from {low:g} to {high:g} and the particles from "
                     f"{box[0, axis]:g} to {box[1, axis]:g} [m]; make them the same."
                 )
-        diameter = 2.0 * float(simulation._state.place[:, 3].mean())
-        self.smoother = Smoother(grid, self.settings.width * diameter)
+        self._diameter = 2.0 * float(simulation._state.place[:, 3].mean())
+        self.smoother = Smoother(grid, self.settings.width * self._diameter)
         self.transfer = Transfer(grid, self.smoother)
         self.time = 0.0
         self.steps = 0
@@ -125,6 +128,9 @@ class GasParticles:
             # Half a relaxation time: the force is of the velocity at the start.
             rate = max(self._rate or 0.0, 1e-300) * self.simulation.time_step
             steps = min(steps, int(min(0.5 / rate, 1e9)))
+        if self.settings.lubrication > 0.0:
+            rate = max(self._films(0.0)[1], 1e-300) * self.simulation.time_step
+            steps = min(steps, int(min(_SHARE_OF_FILM / rate, 1e9)))
         return max(1, steps)
 
     def step(self, steps: int | None = None) -> ExchangeReport:
@@ -198,6 +204,8 @@ class GasParticles:
             given += dt * steady.sum(axis=0)
             inside, outside = self.transfer.split([-f for f in loads])
             taken, rims = taken + dt * inside, rims + dt * outside
+        if self.settings.lubrication > 0.0:
+            pushed[order] += self._films(dt)[0]
         sim.push(pushed)
         sim.run(count)
         if self.heat is not None:
@@ -308,13 +316,22 @@ class GasParticles:
             self._seen = kept
         return None if result is None else np.ascontiguousarray(result)
 
+    def _films(self, dt: float) -> tuple[Array, float]:
+        """Forces of the films between particles, and how fast the fastest one shrinks [1/s]."""
+        d, settings = self._diameter, self.settings
+        return lubrication(
+            self.simulation, self.gas.fluid.viscosity, settings.lubrication * d,
+            settings.roughness * d, dt,
+        )  # fmt: skip
+
     def _by_pressure(self, overlaps: Overlaps) -> Array:
         """Minus the integral of the pressure gradient over each particle, (n, 3) [N]."""
         return -overlaps.integral(self._slopes())
 
     def _slopes(self) -> Array:
         """Pressure gradient of the cells, smoothed as all that is exchanged is [Pa/m]."""
-        slopes: Array = cell_slopes(self.gas.pressure, self.gas.grid) + imposed_gradient(self.gas)
+        slopes = cell_slopes(self.gas.pressure, self.gas.grid)
+        slopes += imposed_gradient(self.gas)
         if not self.smoother.idle:
             for c in range(3):
                 slopes[..., c] = self.smoother.cells(slopes[..., c])

@@ -1,16 +1,20 @@
 """Fixes in LAMMPS and LIGGGHTS: forces and heat flows of greybed itself, on one rank and on two."""
 
+import json
+
 import numpy as np
 import pytest
 from host_cases import CELL, EDGE, GAS, HOSTS, WIND, built, grains, run_deck, start
 
-from greybed.closures import load_any, model_path
+from greybed.cli.main import main
+from greybed.closures import content_hash, load_any, model_path
 from greybed.closures.drag.filtered import Material, filtered_force
 from greybed.closures.drag.laws import drag_law
 from greybed.closures.viewfactor.markers import pair_markers
 from greybed.closures.viewfactor.neighbourhood import neighbourhood
 from greybed.core import Packing
 from greybed.core.exact import pair_factor
+from greybed.hosts import lammps, liggghts
 
 DRAG = "shipped:filtered_drag_mlp_plain"
 PENCIL = "shipped:viewfactor_mlp_pencil"
@@ -156,3 +160,67 @@ def test_two_ranks_heat_grains_as_one_does(engine, adapters):
     *_, (_, both, _) = heat_deck(engine, folder, ranks=2)
     assert np.abs(alone[:, 3] - first[:, 3]).max() > 1e-6  # they have been heated [K]
     assert np.abs(alone[:, 3] - both[:, 3]).max() < 1e-11 * alone[:, 3].max()
+
+
+def test_the_example_runs_on_two_ranks_and_says_what_it_did(engine, adapters):
+    folder = adapters(engine, PENCIL)
+    HOSTS[engine].host.run(folder, ranks=2)
+    (said,) = HOSTS[engine].host.said(folder)
+    assert load_hash(PENCIL) in said
+    assert "0 outside the training data" in said
+
+
+def load_hash(model):
+    return content_hash(load_any(model_path(model)))
+
+
+def test_the_policy_abort_stops_the_run(engine, adapters):
+    folder = adapters(engine, DRAG)
+    centres, radii = grains()
+    start(folder, centres, radii, np.zeros_like(centres))
+    gas = f"gas {GAS['density']} {GAS['viscosity']} velocity 0 0 60 cell {CELL} policy abort"
+    lines = [*HOSTS[engine].head(1e-6, heat=False), f"fix drag all greybed/drag {gas}"]
+    with pytest.raises(AssertionError, match="outside the training data"):
+        run_deck(engine, folder, lines, 1, "x y z")
+
+
+CASE = """
+kind = "particles"
+duration = 0.2
+[output]
+samples = 0.1
+[[material]]
+name = "glass"
+density = 2500
+youngs_modulus = "50 kPa"
+poissons_ratio = 0.3
+[[contact]]
+between = ["glass", "glass"]
+restitution = 0.6
+friction = 0.3
+[[particles]]
+kind = "file"
+material = "glass"
+file = "start.csv"
+"""
+
+
+def test_a_case_takes_a_plugin_along(engine, adapters, tmp_path):
+    """A sphere of 0.1 mm that falls in air has its terminal velocity after 0.2 s."""
+    # LIGGGHTS: where its only build is that of the closure, a filter of no size is the law alone.
+    model = "law:wen-yu" if engine == "lammps" else DRAG
+    file = {"lammps": lammps.PLUGIN, "liggghts": liggghts.PROGRAM}[engine]
+    plugin = adapters(engine, model) / file
+    (tmp_path / "start.csv").write_text("x [mm],y [mm],z [mm],radius [mm]\n0,0,0,0.05\n")
+    (tmp_path / "case.toml").write_text(CASE)
+    fix = "greybed/drag gas 1.2 1.8e-5 velocity 0 0 0 fraction 0 filter 0"
+    words = ["--engine", engine, "--quiet", "--plugin", str(plugin), "--fix", fix]
+    case, out = str(tmp_path / "case.toml"), str(tmp_path / "out")
+    assert main(["simulate", case, "--out", out, *words]) == 0
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    mass = 2500.0 * np.pi / 6.0 * 1e-4**3
+    speed = np.sqrt(2.0 * summary["kinetic_energy_J"] / mass)
+    law = drag_law("wen-yu")(0.0, 1.2 * 1e-4 * speed / 1.8e-5)
+    # exp(-0.2 s / 0.07 s) of the way is left, and less as drag grows with speed.
+    assert 3.0 * np.pi * 1.8e-5 * 1e-4 * law * speed == pytest.approx(mass * 9.81, rel=0.05)
+    assert "evaluations" in (tmp_path / "out" / engine / f"log.{engine}").read_text()
