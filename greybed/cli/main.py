@@ -28,6 +28,7 @@ VERBS = {
     "check": ("check", "check a closure's limiting cases and golden rows"),
     "export": ("export", "export a closure to C++ or ONNX"),
     "simulate": ("simulate", "run a coupled case from a TOML file"),
+    "calibrate": ("calibrate", "find parameters from measured bulk behaviour, and their ambiguity"),
     "diagnose": ("diagnose", "trace a residual to the effect that a model lacks"),
     "blindtest": ("blindtest", "test the residual analysis on sealed data sets"),
 }
