@@ -23,10 +23,10 @@ int main(int argc, char **argv) {
   double single = 1e300, batch = 1e300;
   for (int run = 0; run < std::atoi(argv[2]); run++) {
     clock::time_point t = clock::now();
-    for (int k = 0; k < n; k++) out[k] = CLOSURE::evaluate(a[k], b[k], c[k], d[k]);
+    for (int k = 0; k < n; k++) out[k] = CLOSURE::eval(a[k], b[k], c[k], d[k]);
     const double one = std::chrono::duration<double>(clock::now() - t).count() / n;
     t = clock::now();
-    CLOSURE::evaluate_batch(n, a, b, c, d, out.data());
+    CLOSURE::eval_batch(n, a, b, c, d, out.data());
     const double many = std::chrono::duration<double>(clock::now() - t).count() / n;
     single = one < single ? one : single;
     batch = many < batch ? many : batch;

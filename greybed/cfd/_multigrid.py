@@ -88,6 +88,17 @@ def diagonal(tx, ty, tz, diag, inverse):
 
 
 @njit(**_OPTIONS)
+def sound(t):
+    """Whether all numbers are finite and at least 0."""
+    ok = True
+    for k in range(t.shape[0]):
+        for j in range(t.shape[1]):
+            for i in range(t.shape[2]):
+                ok &= 0.0 <= t[k, j, i] < np.inf
+    return ok
+
+
+@njit(**_OPTIONS)
 def _gather_row(fine, at, share, out):
     """Add faces across x of a fine row to those of the coarse row that holds it."""
     for i in range(out.size):
@@ -128,24 +139,6 @@ def coarsen(tx, ty, tz, halved, at, share, cx, cy, cz):
     for k in range(z_at.size):
         for j in range(ny):
             _pair_row(tz[z_at[k], j], hx, z_share[k], cz[k, j // 2 if hy else j])
-
-
-@njit(**_OPTIONS)
-def dense(tx, ty, tz, diag, matrix):
-    """All of it as a matrix."""
-    nz, ny, nx = diag.shape
-    matrix[:, :] = 0.0
-    for k in range(nz):
-        for j in range(ny):
-            for i in range(nx):
-                row = matrix[(k * ny + j) * nx + i]
-                row[(k * ny + j) * nx + i] += diag[k, j, i]
-                row[(k * ny + j) * nx + (i - 1) % nx] -= tx[k, j, i]
-                row[(k * ny + j) * nx + (i + 1) % nx] -= tx[k, j, i + 1]
-                row[(k * ny + (j - 1) % ny) * nx + i] -= ty[k, j, i]
-                row[(k * ny + (j + 1) % ny) * nx + i] -= ty[k, j + 1, i]
-                row[((k - 1) % nz * ny + j) * nx + i] -= tz[k, j, i]
-                row[((k + 1) % nz * ny + j) * nx + i] -= tz[k + 1, j, i]
 
 
 # -- a cycle --------------------------------------------------------------------------------------

@@ -314,3 +314,14 @@ def largest(box):
                     if most != most:
                         return most
     return most
+
+
+@njit(**_OPTIONS)
+def greatest(box):
+    """Largest magnitude of a box of any strides."""
+    most = 0.0
+    for k in range(box.shape[0]):
+        for j in range(box.shape[1]):
+            for i in range(box.shape[2]):
+                most = max(most, abs(box[k, j, i]))
+    return most

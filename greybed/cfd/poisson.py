@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from greybed.cfd import _multigrid
+from greybed.cfd import _coarsest, _multigrid
 from greybed.core.errors import InputError
 
 Array = NDArray[np.float64]
@@ -80,7 +80,7 @@ class Poisson:
     def update(self, tx: Array, ty: Array, tz: Array) -> None:
         """Take other transmissibilities of the same shapes."""
         for name, t in (("tx", tx), ("ty", ty), ("tz", tz)):
-            if not (t.min() >= 0.0 and t.max() < np.inf):
+            if not _multigrid.sound(t):
                 raise InputError(f"{name}: transmissibilities must be finite and at least 0.")
         closed = {0: tx, 1: ty}.get(self._turn)
         if closed is not None and closed.any():
@@ -105,9 +105,9 @@ class Poisson:
                 if not self.periodic[k // 2]:
                     rim[...] = 0.0
         last = self.levels[-1]
-        matrix = np.empty((last.diag.size, last.diag.size))
-        _multigrid.dense(last.tx, last.ty, last.tz, last.diag, matrix)
-        self._inverse = np.linalg.pinv(0.5 * (matrix + matrix.T), hermitian=True)
+        self._coarsest = np.empty((last.diag.size, last.diag.size))
+        _coarsest.dense(last.tx, last.ty, last.tz, last.diag, self._coarsest)
+        _coarsest.factor(self._coarsest)
 
     @staticmethod
     def _rims(level: _Level) -> tuple[Array, ...]:
@@ -158,7 +158,7 @@ class Poisson:
         """One V-cycle, beginning with 0: values of this level, which the next cycle overwrites."""
         level = self.levels[number]
         if number == len(self.levels) - 1:
-            level.p[...] = (self._inverse @ b.ravel()).reshape(level.p.shape)
+            _coarsest.solve_factored(self._coarsest, b, level.p)
             return level.p
         faces, deep = (level.tx, level.ty, level.tz), self._deep(level)
         how = (level.halved, self.periodic[::-1])

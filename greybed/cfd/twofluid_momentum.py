@@ -130,7 +130,7 @@ def _project(st: Stepper, state: State, new: State, dt: float) -> None:
         faces.append(t)
         hat = st.array(f"hatq{a}")
         _twofluid.gather(hat, rims.strides[a], -volume / st.h[a], a == st.axes[0], net)
-        size += float(np.abs(rims.inside(hat, a)).max()) * volume / st.h[a]
+        size += _twofluid.greatest(rims.inside(hat, a)) * volume / st.h[a]
     created = np.ascontiguousarray(rims.inside(net))
     new.p_before[:] = state.p
     start = rims.inside(state.p).copy()

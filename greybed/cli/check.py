@@ -15,13 +15,21 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from greybed.cli.export import targets
-
 if TYPE_CHECKING:
     from pathlib import Path
 
     from greybed.closures.artifact import Closure
     from greybed.closures.viewfactor.limits import LimitCase
+
+
+def targets(text: str) -> tuple[str, ...]:
+    """Read a list of the exported forms that are checked."""
+    words = tuple(dict.fromkeys(word.strip() for word in text.split(",")))
+    if not words or not set(words) <= {"cpp", "onnx"}:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} must be one or more of cpp, onnx, with commas between"
+        )
+    return words
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,33 +85,17 @@ def _exported(closure: Closure, target: str, folder: Path) -> dict[str, Any]:
     from greybed.closures import FilteredDragClosure
     from greybed.closures.drag.filtered import limits as drag_limits
     from greybed.closures.viewfactor.limits import check_limits
-    from greybed.export import (
-        CompiledClosure,
-        CompiledDrag,
-        OnnxClosure,
-        OnnxDrag,
-        compile_cpp,
-        export_cpp,
-        export_drag_cpp,
-        export_drag_onnx,
-        export_onnx,
-    )
+    from greybed.export import CompiledClosure, OnnxClosure, compile_cpp, export_cpp, export_onnx
     from greybed.export.replay import CPP_TOLERANCE, ONNX_TOLERANCE, replay
 
-    form: CompiledClosure | OnnxClosure | CompiledDrag | OnnxDrag
-    tolerance = CPP_TOLERANCE if target == "cpp" else ONNX_TOLERANCE
-    if isinstance(closure, FilteredDragClosure):
-        if target == "cpp":
-            form = CompiledDrag(compile_cpp(export_drag_cpp(closure, folder), folder))
-        else:
-            form = OnnxDrag(export_drag_onnx(closure, folder / "closure.onnx"))
-        rows = replay(closure, form, tolerance)
-        return {"cases": drag_limits.check_limits(closure, form.predict), "rows": rows}
+    form: CompiledClosure | OnnxClosure
     if target == "cpp":
         form = CompiledClosure(compile_cpp(export_cpp(closure, folder), folder))
     else:
         form = OnnxClosure(export_onnx(closure, folder / "closure.onnx"))
-    rows = replay(closure, form, tolerance)
+    rows = replay(closure, form, CPP_TOLERANCE if target == "cpp" else ONNX_TOLERANCE)
+    if isinstance(closure, FilteredDragClosure):
+        return {"cases": drag_limits.check_limits(closure, form.predict), "rows": rows}
     return {"cases": check_limits(closure, evaluate=form.evaluate), "rows": rows}
 
 

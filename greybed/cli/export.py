@@ -3,8 +3,11 @@
 Examples:
   greybed export bed.closure --to cpp --out runs/host
   greybed export bed.closure --to cpp,onnx --name bed_radiation --out runs/host
+  greybed export bed.closure --to cpp,c,fortran,onnx --out runs/host
 
-C++: NAME.hpp (one header, C++11), NAME_test.cpp, CMakeLists.txt, README.md; ONNX: NAME.onnx.
+cpp: NAME.hpp (one header, C++11), NAME_test.cpp, CMakeLists.txt, README.md; c: also NAME_c.h and
+NAME_c.cpp for libNAME.so; fortran: also the module NAME.f90; onnx: NAME.onnx in double precision;
+onnx32: NAME_f32.onnx in single precision.
 Without a C++ compiler the header is written unreplayed, and says so. summary.json holds the
 errors. The exit code is 1, and nothing is written, where a golden row fails.
 """
@@ -19,7 +22,7 @@ if TYPE_CHECKING:
     from greybed.closures.artifact import Closure
     from greybed.closures.term import GreyBoxTerm
 
-TARGETS = ("cpp", "onnx")
+TARGETS = ("cpp", "c", "fortran", "onnx", "onnx32")
 
 
 def targets(text: str) -> tuple[str, ...]:
@@ -38,7 +41,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "model", metavar="MODEL", help="a .closure file, shipped:NAME, or a grey-box term"
     )
     parser.add_argument(
-        "--to", type=targets, required=True, metavar="LIST", help="cpp, onnx, or cpp,onnx"
+        "--to",
+        type=targets,
+        required=True,
+        metavar="LIST",
+        help=f"one or more of {', '.join(TARGETS)}",
     )
     parser.add_argument("--out", required=True, metavar="DIR", help="folder for the files")
     parser.add_argument(
@@ -48,61 +55,73 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _replayed(closure: Closure, target: str, folder: Path, name: str | None) -> dict[str, Any]:
+def _replayed(
+    subject: Closure | GreyBoxTerm, target: str, folder: Path, name: str | None
+) -> dict[str, Any]:
     """Export to one target and replay the golden rows; ``passed`` is None without a compiler."""
     import tempfile
 
-    from greybed.closures import FilteredDragClosure
     from greybed.export import (
         CompiledClosure,
-        CompiledDrag,
         OnnxClosure,
-        OnnxDrag,
         compile_cpp,
         export_cpp,
-        export_drag_cpp,
-        export_drag_onnx,
         export_onnx,
         find_compiler,
     )
     from greybed.export.metadata import export_name
-    from greybed.export.replay import CPP_TOLERANCE, ONNX_TOLERANCE, replay
+    from greybed.export.replay import (
+        CPP_TOLERANCE,
+        ONNX_TOLERANCE,
+        SINGLE_TOLERANCE,
+        replay,
+    )
 
-    word = export_name(closure, name)
-    if target == "onnx":
-        file = folder / f"{word}.onnx"
-        if isinstance(closure, FilteredDragClosure):
-            return replay(closure, OnnxDrag(export_drag_onnx(closure, file, word)), ONNX_TOLERANCE)
-        return replay(closure, OnnxClosure(export_onnx(closure, file, word)), ONNX_TOLERANCE)
-    drag = isinstance(closure, FilteredDragClosure)
-    if isinstance(closure, FilteredDragClosure):
-        header = export_drag_cpp(closure, folder, word)
-    else:
-        header = export_cpp(closure, folder, word)
+    word = export_name(subject, name)
+    if target in ("onnx", "onnx32"):
+        single = target == "onnx32"
+        file = folder / f"{word}{'_f32' if single else ''}.onnx"
+        graph = export_onnx(subject, file, word, single=single)
+        return replay(subject, OnnxClosure(graph), SINGLE_TOLERANCE if single else ONNX_TOLERANCE)
+    if target in ("c", "fortran"):
+        return _library(subject, target, folder, word)
+    header = export_cpp(subject, folder, word)
     compiler = find_compiler()
     if compiler is None:
         return {"passed": None, "reason": "no C++ compiler found: install one or set CXX"}
     with tempfile.TemporaryDirectory() as build:
-        built = compile_cpp(header, build)
-        program = CompiledDrag(built) if drag else CompiledClosure(built)
-        return {**replay(closure, program, CPP_TOLERANCE), "compiler": " ".join(compiler)}
+        program = CompiledClosure(compile_cpp(header, build))
+        return {**replay(subject, program, CPP_TOLERANCE), "compiler": " ".join(compiler)}
 
 
-def _replayed_term(
-    term: GreyBoxTerm, target: str, folder: Path, name: str | None
+def _library(
+    subject: Closure | GreyBoxTerm, target: str, folder: Path, word: str
 ) -> dict[str, Any]:
-    """The same for a grey-box term."""
+    """The same for the C library, or for the Fortran module that calls it."""
     import tempfile
 
-    from greybed.export import term as exports
+    from greybed.export import (
+        CompiledLibrary,
+        FortranProgram,
+        compile_c,
+        export_c,
+        find_compiler,
+        find_fortran,
+        form_of,
+    )
+    from greybed.export.replay import CPP_TOLERANCE, replay
 
-    word = name or term.name
-    if target == "onnx":
-        path = exports.export_term_onnx(term, folder / f"{word}.onnx", name)
-        return exports.replay_term_onnx(term, path)
-    header = exports.export_term_cpp(term, folder, name)
+    header = export_c(subject, folder, word, fortran=target == "fortran")
+    if find_compiler() is None:
+        return {"passed": None, "reason": "no C++ compiler found: install one or set CXX"}
+    if target == "fortran" and find_fortran() is None:
+        return {"passed": None, "reason": "no Fortran compiler found: install gfortran or set FC"}
+    form = form_of(subject, word)
     with tempfile.TemporaryDirectory() as build:
-        return exports.replay_term_cpp(header, Path(build))
+        library = compile_c(header, build)
+        if target == "c":
+            return replay(subject, CompiledLibrary(library, form), CPP_TOLERANCE)
+        return replay(subject, FortranProgram(header, library, form), CPP_TOLERANCE)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -111,23 +130,18 @@ def run(options: argparse.Namespace) -> int:
     import tempfile
 
     from greybed.closures import content_hash, load_any, model_path
-    from greybed.closures.term import is_term, load_term
+    from greybed.closures.term import GreyBoxTerm, is_term, load_term
     from greybed.core.files import atomic_path, output_folder, write_summary
 
     model = model_path(options.model)
-    term = load_term(model) if is_term(model) else None
-    closure = None if term is not None else load_any(model)
+    subject: Closure | GreyBoxTerm = load_term(model) if is_term(model) else load_any(model)
     folder = output_folder(options.out)
     results: dict[str, Any] = {}
     # Files reach their place only after the replay: a header that computes wrongly is never seen.
     with tempfile.TemporaryDirectory(dir=folder, prefix=".export-") as name:
         workplace = Path(name)
         for target in options.to:
-            if closure is not None:
-                result = _replayed(closure, target, workplace, options.name)
-            else:
-                assert term is not None
-                result = _replayed_term(term, target, workplace, options.name)
+            result = _replayed(subject, target, workplace, options.name)
             results[target] = result
             if result["passed"] is None:
                 print(f"{target}: golden rows not replayed ({result['reason']})")
@@ -148,7 +162,7 @@ def run(options: argparse.Namespace) -> int:
         for file in files:
             with atomic_path(folder / file) as temporary:
                 os.replace(workplace / file, temporary)
-    sealed = term.content_hash() if term is not None else content_hash(load_any(model))
+    sealed = subject.content_hash() if isinstance(subject, GreyBoxTerm) else content_hash(subject)
     summary = write_summary(
         folder,
         "export",

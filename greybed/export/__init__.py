@@ -1,21 +1,27 @@
 """Closures for other programs: a C++ header, an ONNX graph, and the replay that compares them."""
 
-from greybed.export.cpp import export_cpp
-from greybed.export.drag_cpp import export_drag_cpp
-from greybed.export.drag_onnx import export_drag_onnx
-from greybed.export.drag_replay import CompiledDrag, OnnxDrag
+from greybed.export.header import export_cpp, form_of
+from greybed.export.library import (
+    CompiledLibrary,
+    FortranProgram,
+    compile_c,
+    export_c,
+    find_fortran,
+)
 from greybed.export.replay import CompiledClosure, OnnxClosure, compile_cpp, find_compiler
 from greybed.export.to_onnx import export_onnx
 
 __all__ = [
     "CompiledClosure",
-    "CompiledDrag",
+    "CompiledLibrary",
+    "FortranProgram",
     "OnnxClosure",
-    "OnnxDrag",
+    "compile_c",
     "compile_cpp",
+    "export_c",
     "export_cpp",
-    "export_drag_cpp",
-    "export_drag_onnx",
     "export_onnx",
     "find_compiler",
+    "find_fortran",
+    "form_of",
 ]

@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from math import isinf
+from typing import Any
 
 from greybed._version import __version__
 from greybed.closures import content_hash
 from greybed.closures.artifact import Closure
-from greybed.closures.viewfactor.visibility import Marker
+from greybed.closures.markers import Marker
+from greybed.closures.term import GreyBoxTerm
 from greybed.core import InputError
 
 LICENCE = "BSD-3-Clause"
@@ -64,7 +66,7 @@ QUANTITIES = {
         ),
     ),
     "filtereddrag": Quantity(
-        "fraction of drag that is kept on a coarse grid",
+        "filtered drag, as the fraction kept of the drag law on a coarse grid",
         "kept_along",
         (
             "F = (1 - share) beta [H_along g g + H_across (I - g g)] slip + share P,",
@@ -88,8 +90,8 @@ _RESERVED = """
     xor xor_eq std greybed"""
 
 
-def export_name(closure: Closure, name: str | None = None) -> str:
-    """Name of an export: ``name`` if it is an identifier, else one made from the closure.
+def export_name(subject: Closure | GreyBoxTerm, name: str | None = None) -> str:
+    """Name of an export: ``name`` if it is an identifier, else one made from the closure or term.
 
     Raises
     ------
@@ -97,7 +99,9 @@ def export_name(closure: Closure, name: str | None = None) -> str:
         If ``name`` is no identifier in C++.
     """
     if name is None:
-        return f"{closure.quantity}_{closure.markers.name}_{closure.kind}"
+        if not isinstance(subject, GreyBoxTerm):
+            return f"{subject.quantity}_{subject.markers.name}_{subject.kind}"
+        name = re.sub(r"\W+", "_", subject.name)
     sound = re.fullmatch(r"[A-Za-z][A-Za-z0-9_]{0,99}", name) and "__" not in name
     if not sound or name in _RESERVED.split():
         raise InputError(
@@ -118,6 +122,12 @@ def dataset_hash(closure: Closure) -> str:
     return str(closure.card.get("data_sha256", ""))
 
 
+def cited(card: dict[str, Any], title: str, hash_: str) -> str:
+    """How to cite a closure: as its card says, else as made with greybed, by title and hash."""
+    usual = f"the greybed developers, greybed {__version__}: {title}, SHA-256 {hash_[:16]}"
+    return str(card.get("citation", usual))
+
+
 def describe(closure: Closure, name: str) -> dict[str, str]:
     """Plain strings that travel with every exported form."""
     return {
@@ -129,6 +139,11 @@ def describe(closure: Closure, name: str) -> dict[str, str]:
         "hash": content_hash(closure),
         "dataset_hash": dataset_hash(closure),
         "licence": LICENCE,
+        "citation": cited(
+            closure.card,
+            f"{QUANTITIES[closure.quantity].title}, {closure.kind}, {closure.markers.name} markers",
+            content_hash(closure),
+        ),
         **{
             f"marker_{marker.name}": f"{marker.meaning} [-], in {allowed(marker)}"
             for marker in closure.markers.markers

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from greybed.closures.predictors import Forest, Network
+from greybed.closures.viewfactor.closure import Domain
 from greybed.core import InputError
 
 LARGEST = float(np.finfo(np.float64).max)
@@ -75,12 +77,49 @@ def doubles(name: str, values: Any) -> Table:
     return Table(name, "double", array)
 
 
+def _padded(array: NDArray, axis: int) -> NDArray:
+    """Zeros after the end of an axis, to a multiple of four: neurons that give 0 and count 0."""
+    widths = [(0, 0)] * array.ndim
+    widths[axis] = (0, -array.shape[axis] % 4)
+    return np.pad(array, widths)
+
+
+def _layers(network: Network) -> tuple[list[NDArray], list[NDArray]]:
+    """Weights and biases whose layers between are multiples of four wide."""
+    weights, biases = list(network.weights), list(network.biases)
+    for k in range(len(weights) - 1):
+        weights[k], biases[k] = _padded(weights[k], 1), _padded(biases[k], 0)
+        weights[k + 1] = _padded(weights[k + 1], 0)
+    return weights, biases
+
+
 def network_tables(network: Network) -> list[Table]:
-    """Tables of a network."""
-    tables = [doubles("mean", network.mean), doubles("scale", network.scale)]
-    for k, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):
-        tables += [doubles(f"weight_{k}", weight), doubles(f"bias_{k}", bias)]
-    return tables
+    """Tables of a network: its layers, and those of the way back that derivatives take.
+
+    Raises
+    ------
+    InputError
+        If there is no layer between features and answers.
+    """
+    if len(network.weights) < 2:
+        raise InputError(
+            "a network without a layer between features and answers has no exported form; train "
+            "it again with one."
+        )
+    weights, biases = _layers(network)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = 1.0 / np.asarray(network.scale, dtype=np.float64)
+    tables = [doubles("mean", network.mean), doubles("inverse_scale", inverse)]
+    for k, bias in enumerate(biases):
+        if k + 1 < len(biases):
+            tables.append(doubles(f"weight_{k}", weights[k]))
+        tables.append(doubles(f"bias_{k}", bias))
+    # Turned, so that the way back runs along memory too.
+    for k, weight in enumerate(weights[1:-1], start=1):
+        tables.append(doubles(f"turned_{k}", np.ascontiguousarray(weight.T)))
+    inward = _padded((weights[0] * inverse[:, None]).T, 1)
+    last = np.ascontiguousarray(weights[-1].T)
+    return [*tables, doubles("last", last), doubles("inward", np.ascontiguousarray(inward))]
 
 
 def forest_tables(forest: Forest) -> list[Table]:
@@ -100,6 +139,44 @@ def forest_tables(forest: Forest) -> list[Table]:
         Table("following", "std::int32_t", following.astype(np.int32)),
         doubles("leaf_values", forest.value[leaf]),
     ]
+
+
+def learnt_tables(predictor: Network | Forest, domain: Domain) -> list[Table]:
+    """Tables of the learnt part and of where its training data lie."""
+    low, high = finite(domain.low), finite(domain.high)
+    return [
+        doubles("domain_low", low),
+        doubles("domain_high", high),
+        doubles("domain_centre", domain.centre),
+        doubles("domain_precision", _padded(domain.precision, 1)),
+        *(
+            network_tables(predictor)
+            if isinstance(predictor, Network)
+            else forest_tables(predictor)
+        ),
+    ]
+
+
+def learnt_context(predictor: Network | Forest, domain: Domain) -> dict[str, Any]:
+    """What the templates of the learnt part need besides its tables."""
+    with np.errstate(over="ignore"):
+        limit2 = float(finite(np.float64(domain.limit) ** 2))
+    n = len(domain.low)
+    context: dict[str, Any] = {
+        "n_features": n,
+        "columns": n + -n % 4,
+        "limit2": repr(limit2),
+    }
+    if isinstance(predictor, Network):
+        widths = [len(bias) for bias in predictor.biases]
+        sizes = [n, *(w + -w % 4 for w in widths[:-1]), widths[-1]]
+        context |= {
+            "layers": list(pairwise(sizes)),
+            "bend": "Bent" if predictor.bent else "Tanh",
+        }
+    else:
+        context |= {"n_raw": predictor.value.shape[1], "n_trees": len(predictor.roots)}
+    return context
 
 
 def finite(values: Any) -> NDArray:

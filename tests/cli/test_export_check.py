@@ -148,8 +148,8 @@ def test_a_broken_artifact_ends_in_one_sentence(verb, damage, tmp_path, capsys, 
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["--to", "fortran"], "must be one or more of cpp, onnx"),
-        (["--to", ""], "must be one or more of cpp, onnx"),
+        (["--to", "java"], "must be one or more of cpp, c, fortran, onnx"),
+        (["--to", ""], "must be one or more of cpp, c, fortran, onnx"),
         ([], "the following arguments are required: --to"),
     ],
 )

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from sklearn.ensemble import RandomForestRegressor
 
-from greybed.closures import ViewFactorClosure, shipped
+from greybed.closures import FilteredDragClosure, ViewFactorClosure, shipped
 from greybed.closures.predictors import Forest, Network
+from greybed.closures.term import GreyBoxTerm
 from greybed.closures.viewfactor.closure import Domain
 from greybed.closures.viewfactor.limits import random_markers
 from greybed.closures.viewfactor.visibility import MARKER_SETS
@@ -20,13 +21,20 @@ from greybed.export import (
     find_compiler,
 )
 
-WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
+# Those of OpenFOAM among them.
+WARNINGS = (
+    "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wold-style-cast", "-Wnon-virtual-dtor",
+    "-Wno-unused-parameter", "-Werror",
+)  # fmt: skip
 FLAGS = {
     "O0": ("-std=c++11", "-O0", *WARNINGS),
-    "O2": ("-std=c++14", "-O2", *WARNINGS),
-    "O3 native": ("-std=c++17", "-O3", "-march=native", *WARNINGS),
-    "O3 native fast-math": ("-std=c++20", "-O3", "-march=native", "-ffast-math", *WARNINGS),
+    "O2": ("-std=c++11", "-O2", *WARNINGS),
+    "O3 native": ("-std=c++14", "-O3", "-march=native", *WARNINGS),
+    "Ofast": ("-std=c++17", "-Ofast", *WARNINGS),
+    "fast-math native": ("-std=c++20", "-O2", "-march=native", "-ffast-math", *WARNINGS),
 }
+# A call of the compiler takes seconds: every closure with these two, one of each kind with all.
+EVERY = ["O2", "fast-math native"]
 # Closures of pairs; those to walls and of exchange have tests of their own.
 PAIRS = [name for name, markers in MARKER_SETS.items() if markers.quantity == "viewfactor"]
 UNTRAINED = [f"{kind} {markers} 3" for kind in ("mlp", "forest") for markers in PAIRS]
@@ -101,6 +109,11 @@ def closures():
         made[name] = ViewFactorClosure.untrained(kind, markers, int(seed))
     for name in SHIPPED:
         made[name] = shipped(name.split()[1])
+    made["drag"] = FilteredDragClosure.untrained("mlp", "full", seed=3)
+    made["term"] = GreyBoxTerm(
+        name="term", covariate="humidity", unit="", response="velocity", reference=10.0,
+        amplitude=0.3, exponent=1.5, side=-1, window=(1.0, 10.0),
+    )  # fmt: skip
     made["fitted mlp pencil"] = _fitted_network("pencil")
     made["fitted forest published"] = _fitted_forest("published")
     return made

@@ -9,9 +9,10 @@ from onnx import TensorProto
 from onnx.reference import ReferenceEvaluator
 
 from greybed.closures import content_hash, golden_rows
+from greybed.closures.viewfactor.limits import check_limits
 from greybed.core import InputError, RangeError
 from greybed.export import OnnxClosure, export_onnx
-from greybed.export.replay import relative_error
+from greybed.export.replay import SINGLE_TOLERANCE, relative_error, replay
 
 NAMES = UNTRAINED + FITTED
 
@@ -57,6 +58,40 @@ def test_reference_evaluator_gives_the_golden_rows(name, graph, closures):
     factor, error, _ = ReferenceEvaluator(graph(name)).run(None, feed)
     assert relative_error(factor, expected[:12, 0]).max() <= 1e-12
     assert relative_error(error, expected[:12, 1]).max() <= 1e-12
+
+
+@pytest.mark.parametrize("name", ["fitted mlp pencil", "fitted forest published", "drag", "term"])
+def test_single_precision_has_the_same_limits_and_digits(name, closures, tmp_path):
+    closure = closures[name]
+    path = export_onnx(closure, tmp_path / "single.onnx", single=True)
+    model = onnx.load(path)
+    kinds = {v.type.tensor_type.elem_type for v in [*model.graph.input, *model.graph.output]}
+    assert kinds == {TensorProto.FLOAT, TensorProto.BOOL}
+    assert not [t for t in model.graph.initializer if t.data_type == TensorProto.DOUBLE]
+    form = OnnxClosure(path)
+    result = replay(closure, form, SINGLE_TOLERANCE)
+    assert result["passed"], result
+    assert result["max_relative_error"] > 1e-10  # or it would be double after all
+    if getattr(closure, "quantity", "") == "viewfactor":
+        cases = check_limits(closure, evaluate=form.evaluate, n=3000, rounding=2e-6)
+        assert [case for case in cases if not case.passed] == []
+
+
+def test_names_shapes_and_meanings_come_back(closures, tmp_path):
+    # What a viewer of graphs shows: Netron reads nothing else.
+    for name in ("fitted mlp pencil", "drag", "term"):
+        model = onnx.load(export_onnx(closures[name], tmp_path / "a.onnx"))
+        graph = model.graph
+        assert graph.name == model.metadata_props[0].value
+        assert graph.doc_string
+        assert model.doc_string == graph.doc_string
+        for value in [*graph.input, *graph.output]:
+            assert value.doc_string
+        # Every value between has a type and a shape, every node a name of its own.
+        known = {v.name: v.type.tensor_type for v in [*graph.value_info, *graph.output]}
+        assert {n.output[0] for n in graph.node} == set(known)
+        assert all(t.HasField("shape") and t.elem_type for t in known.values())
+        assert len({n.name for n in graph.node}) == len(graph.node)
 
 
 def test_metadata(graph, closures):

@@ -14,12 +14,15 @@ from synthetic import spheres
 from greybed.cli import main
 from greybed.closures.term import GreyBoxTerm, load_term
 from greybed.core.errors import InputError, VerificationError
-from greybed.export.term import (
-    export_term_cpp,
-    export_term_onnx,
-    replay_term_cpp,
-    replay_term_onnx,
+from greybed.export import (
+    CompiledClosure,
+    OnnxClosure,
+    compile_cpp,
+    export_cpp,
+    export_onnx,
+    find_compiler,
 )
+from greybed.export.replay import replay
 from greybed.residual import diagnose
 from greybed.residual.output import write_diagnosis
 
@@ -51,10 +54,11 @@ def test_every_form_answers_the_same(tmp_path, side, exponent):
     assert again == term
     z = np.geomspace(0.01, 100.0, 50)
     assert np.array_equal(again.evaluate(z), term.evaluate(z))
-    graph = replay_term_onnx(term, export_term_onnx(term, tmp_path / "t.onnx"))
-    assert graph["passed"], graph
-    program = replay_term_cpp(export_term_cpp(term, tmp_path), tmp_path / "build")
-    assert program["passed"] in (True, None), program
+    graph = OnnxClosure(export_onnx(term, tmp_path / "t.onnx"))
+    assert replay(term, graph, 1e-12)["passed"]
+    if find_compiler() is not None:
+        program = CompiledClosure(compile_cpp(export_cpp(term, tmp_path), tmp_path / "build"))
+        assert replay(term, program, 1e-12)["passed"]
 
 
 def test_a_changed_term_is_refused(tmp_path):
@@ -92,7 +96,8 @@ def test_an_unknown_dependence_becomes_a_term_that_runs_and_exports(tmp_path, ca
     words = ["export", str(files["humidity_term"]), "--to", "cpp,onnx", "--out", f"{tmp_path}/x"]
     assert main(words) == 0
     assert {p.name for p in (tmp_path / "x").iterdir()} == {
-        "humidity_term.hpp", "humidity_term_test.cpp", "humidity_term.onnx", "summary.json",
+        "CMakeLists.txt", "README.md", "humidity_term.hpp", "humidity_term_test.cpp",
+        "humidity_term.onnx", "summary.json",
     }  # fmt: skip
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from greybed.closures.markers import checked_markers
 from greybed.closures.predictors import PREDICTORS, Predictor
 from greybed.closures.viewfactor.visibility import (
     MARKER_SETS,
@@ -292,27 +293,7 @@ class ViewFactorClosure:
         )
 
     def _checked(self, markers: dict[str, ArrayLike]) -> dict[str, Array]:
-        wanted, given = set(self.marker_names), set(markers)
-        if wanted != given:
-            raise RangeError(
-                f"this closure takes the markers {', '.join(self.marker_names)}; "
-                f"missing: {', '.join(sorted(wanted - given)) or 'none'}, "
-                f"unknown: {', '.join(sorted(given - wanted)) or 'none'}."
-            )
-        arrays = [np.asarray(markers[name], dtype=np.float64) for name in self.marker_names]
-        m = dict(zip(self.marker_names, np.broadcast_arrays(*arrays), strict=True))
-        for marker in self.markers.markers:
-            value = m[marker.name]
-            bad = ~np.isfinite(value) | (value > marker.high)
-            bad |= (value <= marker.low) if marker.low_open else (value < marker.low)
-            if bad.any():
-                at = np.unravel_index(int(bad.argmax()), bad.shape)
-                place = f"[{', '.join(map(str, at))}]" if at else ""
-                raise RangeError(
-                    f"{marker.name}{place} = {value[at]:g} [-] ({marker.meaning}) must lie in "
-                    f"{'(' if marker.low_open else '['}{marker.low:g}, {marker.high:g}]; "
-                    "check how the markers were made."
-                )
+        m = checked_markers(self.markers.markers, markers)
         if self.quantity == "wallfactor":
             return m
         x = m["radius_over_distance"]

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from greybed.closures.markers import Marker
 from greybed.core.exact import pair_factor
 
 Array = NDArray[np.float64]
@@ -25,31 +26,6 @@ Markers = dict[str, Array]
 ODDS_BOUND = 4.0
 # Largest standard error of v that a network can predict.
 SPREAD_BOUND = 0.5
-
-
-@dataclass(frozen=True)
-class Marker:
-    """One input of a closure.
-
-    Attributes
-    ----------
-    name, meaning : str
-        Keyword of ``evaluate`` and what it stands for.
-    low, high : float
-        Hard range [-]; ``low_open`` excludes the lower end.
-    free : float, optional
-        Value where nothing stands between the spheres; None where it says nothing of that.
-    typical : (float, float), optional
-        Range to draw from when limits are checked; None for the two that describe the pair.
-    """
-
-    name: str
-    meaning: str
-    low: float
-    high: float
-    low_open: bool = False
-    free: float | None = None
-    typical: tuple[float, float] | None = None
 
 
 OVER_DISTANCE = Marker("radius_over_distance", "r_j / d", 0.0, 1.05, low_open=True)

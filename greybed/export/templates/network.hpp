@@ -1,63 +1,53 @@
-{# A network: its layers, one call for all outputs. #}
-/// x = tanh(x) to a few 1e-16, in plain arithmetic that becomes vector instructions.
-/// No step relies on the order of rounding, so -ffast-math cannot break it.
-template <int N>
-inline void squash(double* x) {
-  double y[N];
-  // A loop of its own: a compiler that knows y = -40 in one branch would branch in the next loop.
-  for (int j = 0; j < N; ++j) {
-    const double wide = -2.0 * std::fabs(x[j]);
-    y[j] = wide > -40.0 ? wide : -40.0;  // tanh(20) rounds to 1
-  }
-  for (int j = 0; j < N; ++j) {
-    // e^y = 2^k e^r with |r| <= log(2) / 2; the cast cuts towards zero, which rounds as y <= 0
-    const int k = static_cast<int>(y[j] * 1.4426950408889634 - 0.5);
-    const double r = (y[j] - k * 0.693147180369123816490) - k * 1.90821492927058770002e-10;
-    double e = 1.0 / 6227020800.0;
-    e = e * r + 1.0 / 479001600.0;
-    e = e * r + 1.0 / 39916800.0;
-    e = e * r + 1.0 / 3628800.0;
-    e = e * r + 1.0 / 362880.0;
-    e = e * r + 1.0 / 40320.0;
-    e = e * r + 1.0 / 5040.0;
-    e = e * r + 1.0 / 720.0;
-    e = e * r + 1.0 / 120.0;
-    e = e * r + 1.0 / 24.0;
-    e = e * r + 1.0 / 6.0;
-    e = e * r + 0.5;
-    e = e * r + 1.0;
-    e = e * r + 1.0;
-    const std::uint64_t bits = static_cast<std::uint64_t>(k + 1023) << 52;
-    double power;
-    std::memcpy(&power, &bits, sizeof power);
-    e *= power;
-    x[j] = std::copysign((1.0 - e) / (1.0 + e), x[j]);
-  }
-}
+{# The network of a closure. #}
+constexpr int N_RAW = {{ layers[-1][1] }};
+constexpr int N_VALUES = {{ layers[-1][1] - 1 }};
 
-/// y = x W + b; the neurons run innermost so that they share vector instructions.
-template <int N_IN, int N_OUT>
-inline void dense(const double* x, const double* weight, const double* bias, double* y) {
-  double sum[N_OUT];
-  for (int j = 0; j < N_OUT; ++j) sum[j] = bias[j];
-  for (int i = 0; i < N_IN; ++i) {
-    for (int j = 0; j < N_OUT; ++j) sum[j] += x[i] * weight[i * N_OUT + j];
-  }
-  for (int j = 0; j < N_OUT; ++j) y[j] = sum[j];
-}
-
-/// Network: value and spread before their bounds.
-inline void predictor(const double* features, double* raw) {
-  double x_0[{{ layers[0][0] }}];
-  for (int i = 0; i < {{ layers[0][0] }}; ++i) x_0[i] = (features[i] - mean()[i]) / scale()[i];
-{% for n_in, n_out in layers %}
-{% if loop.last %}
-  dense<{{ n_in }}, {{ n_out }}>(x_{{ loop.index0 }}, weight_{{ loop.index0 }}(), bias_{{ loop.index0 }}(), raw);
-{% else %}
+/// The first ROWS outputs before their bounds, of which the last is the spread. With GRADIENT
+/// blocks above 0, slope[4 GRADIENT k + i] is the derivative of value k for feature 4 FIRST + i.
+template <int ROWS, int FIRST, int GRADIENT>
+GREYBED_DEVICE inline void network(const double* features, double* raw, double* slope) {
+  double x_0[N_FEATURES];
+  for (int i = 0; i < N_FEATURES; ++i) x_0[i] = (features[i] - mean()[i]) * inverse_scale()[i];
+{% for n_in, n_out in layers[:-1] %}
   double x_{{ loop.index }}[{{ n_out }}];
-  dense<{{ n_in }}, {{ n_out }}>(x_{{ loop.index0 }}, weight_{{ loop.index0 }}(), bias_{{ loop.index0 }}(), x_{{ loop.index }});
-  squash<{{ n_out }}>(x_{{ loop.index }});
-{% endif %}
+  double s_{{ loop.index }}[{{ n_out }}];
+  Layer<{{ n_in }}, {{ n_out }}, {{ n_out // 4 }}, {{ bend }}, (GRADIENT > 0)>::run(x_{{ loop.index0 }}, weight_{{ loop.index0 }}(), bias_{{ loop.index0 }}(), x_{{ loop.index }}, s_{{ loop.index }});
 {% endfor %}
+{% set top = layers|length - 1 %}
+{% set wide = layers[top][0] %}
+  for (int k = 0; k < ROWS; ++k) {
+    raw[k] = dot<{{ wide // 4 }}>(x_{{ top }}, last() + {{ wide }} * k) + bias_{{ top }}()[k];
+  }
+  if (GRADIENT > 0) {
+    double back_{{ top }}[N_VALUES * {{ wide }}];
+    for (int k = 0; k < N_VALUES; ++k) {
+      Sums<{{ wide // 4 }}> sums;
+      sums.get(last() + {{ wide }} * k);
+      sums.scale_by(s_{{ top }});
+      sums.put(back_{{ top }} + {{ wide }} * k);
+    }
+{% for k in range(top - 1, 0, -1) %}
+{% set n_in = layers[k][0] %}
+{% set n_out = layers[k][1] %}
+    Fan<N_VALUES, {{ n_in // 4 }}, {{ n_out }}> fan_{{ k }};
+    fan_{{ k }}.set(0.0);
+    for (int j = 0; j < {{ n_out }}; ++j) fan_{{ k }}.add(turned_{{ k }}() + {{ n_in }} * j, back_{{ k + 1 }} + j);
+    double back_{{ k }}[N_VALUES * {{ n_in }}];
+    fan_{{ k }}.put_scaled(s_{{ k }}, back_{{ k }}, {{ n_in }});
+{% endfor %}
+    // Two chains, for a sum waits for the one before it.
+    Fan<N_VALUES, GRADIENT, {{ layers[0][1] }}> even;
+    Fan<N_VALUES, GRADIENT, {{ layers[0][1] }}> odd;
+    even.set(0.0);
+    odd.set(0.0);
+    for (int j = 0; j < {{ layers[0][1] }}; j += 2) {
+      even.add(inward() + N_COLUMNS * j + 4 * FIRST, back_1 + j);
+      odd.add(inward() + N_COLUMNS * (j + 1) + 4 * FIRST, back_1 + j + 1);
+    }
+    double half[N_VALUES * 4 * GRADIENT + 1];
+    even.put(slope, 4 * GRADIENT);
+    odd.put(half, 4 * GRADIENT);
+    for (int i = 0; i < N_VALUES * 4 * GRADIENT; ++i) slope[i] += half[i];
+  }
 }
 

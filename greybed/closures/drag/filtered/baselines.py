@@ -26,10 +26,10 @@ from greybed.closures.drag.filtered.markers import (
     FROUDE,
     PARCELS,
     UP,
-    checked_markers,
+    flat_markers,
 )
 from greybed.closures.drag.filtered.milioli import milioli_lost
-from greybed.closures.viewfactor.visibility import Marker
+from greybed.closures.markers import Marker
 from greybed.core.errors import InputError
 
 Array = NDArray[np.float64]
@@ -158,7 +158,7 @@ class PublishedDrag:
 
     def with_slopes(self, **markers: ArrayLike) -> tuple[DragPrediction, DragSlopes]:
         """Kept fractions and their derivatives."""
-        m, shape = checked_markers(self.markers, markers)
+        m, shape = flat_markers(self.markers, markers)
         lost, steep = self.lost(m)
         kept = np.maximum(1.0 - lost, self.least)
         slopes = np.zeros((3, len(kept), 4))

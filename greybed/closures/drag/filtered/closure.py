@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from greybed.closures.drag.filtered.features import MARKER_SETS, DragMarkerSet, Slope, bend
 from greybed.closures.drag.filtered.gate import Gate
-from greybed.closures.drag.filtered.markers import checked_markers
+from greybed.closures.drag.filtered.markers import flat_markers
 from greybed.closures.predictors import Forest, Network, Predictor
 from greybed.closures.viewfactor.closure import Domain
 
@@ -154,7 +154,7 @@ class FilteredDragClosure:
     def _answer(
         self, markers: dict[str, ArrayLike], slopes: bool
     ) -> tuple[DragPrediction, DragSlopes | None]:
-        m, shape = checked_markers(self.markers.markers, markers)
+        m, shape = flat_markers(self.markers.markers, markers)
         features, moving = self.markers.with_slopes(m)
         gate = self.gate(m["solid_fraction"], m["filter_size"])
         inner: Array | None = None

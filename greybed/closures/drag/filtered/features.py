@@ -28,7 +28,7 @@ from greybed.closures.drag.filtered.markers import (
     UP,
     WORK,
 )
-from greybed.closures.viewfactor.visibility import Marker
+from greybed.closures.markers import Marker
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from greybed.closures.drag.filtered.materials import Material
-from greybed.closures.viewfactor.visibility import Marker
-from greybed.core.errors import InputError, RangeError
+from greybed.closures.markers import Marker, checked_markers
+from greybed.core.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -182,37 +182,17 @@ def drag_markers(
     return {name: np.broadcast_to(value, (n,)) for name, value in found.items()}
 
 
-def checked_markers(
+def flat_markers(
     known: Sequence[Marker], markers: dict[str, ArrayLike]
 ) -> tuple[dict[str, Array], tuple[int, ...]]:
-    """Flat arrays of the markers by name, and the shape they had.
+    """Flat arrays of the markers by name, and the shape they had; ``parcels`` may be left out.
 
     Raises
     ------
     RangeError
-        If one is missing, unknown, not finite or out of range. ``parcels`` may be left out.
+        As :func:`greybed.closures.markers.checked_markers`.
     """
-    names = [marker.name for marker in known]
-    given = {"parcels": 1.0, **markers} if "parcels" in names else dict(markers)
-    missing, unknown = sorted(set(names) - set(given)), sorted(set(given) - set(names))
-    if missing or unknown:
-        raise RangeError(
-            f"this drag closure takes the markers {', '.join(names)}; missing: "
-            f"{', '.join(missing) or 'none'}, unknown: {', '.join(unknown) or 'none'}: give those, "
-            "or take a closure with other markers."
-        )
-    arrays = np.broadcast_arrays(*(np.asarray(given[n], dtype=np.float64) for n in names))
-    found = dict(zip(names, arrays, strict=True))
-    for marker in known:
-        value = found[marker.name]
-        bad = ~np.isfinite(value) | (value > marker.high)
-        bad |= (value <= marker.low) if marker.low_open else (value < marker.low)
-        if bad.any():
-            at = np.unravel_index(int(bad.argmax()), bad.shape)
-            place = f"[{', '.join(map(str, at))}]" if at else ""
-            raise RangeError(
-                f"{marker.name}{place} = {value[at]:g} [-] ({marker.meaning}) must lie in "
-                f"{'(' if marker.low_open else '['}{marker.low:g}, {marker.high:g}]; "
-                "check how the markers were made."
-            )
-    return {n: np.ravel(v) for n, v in found.items()}, arrays[0].shape
+    parcels = any(marker.name == "parcels" for marker in known)
+    found = checked_markers(known, {"parcels": 1.0, **markers} if parcels else markers)
+    shape = next(iter(found.values())).shape
+    return {name: np.ravel(value) for name, value in found.items()}, shape

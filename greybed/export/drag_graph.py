@@ -1,9 +1,6 @@
-"""A closure of filtered drag as an ONNX graph: markers in, kept fractions and error out."""
+"""Filtered drag as nodes of ONNX: markers in, kept fractions and error out."""
 
 from __future__ import annotations
-
-import os
-from pathlib import Path
 
 import numpy as np
 
@@ -17,17 +14,14 @@ from greybed.closures.drag.filtered.closure import (
 )
 from greybed.closures.drag.filtered.gate import Gate
 from greybed.closures.predictors import Network
-from greybed.export.metadata import export_name
-from greybed.export.to_onnx import (
+from greybed.export.drag_form import OUTPUTS
+from greybed.export.graph import (
     Graph,
-    forest_nodes,
-    network_nodes,
+    learnt_nodes,
+    logistic_nodes,
     outside_nodes,
     range_nodes,
-    write_model,
 )
-
-OUTPUTS = ("kept_along", "kept_across", "share", "stderr")
 
 
 def _gate(g: Graph, gate: Gate) -> str:
@@ -81,21 +75,12 @@ def _features(g: Graph, closure: FilteredDragClosure) -> str:
     return g.add("Concat", *(g.column(name) for name in columns), axis=1)
 
 
-def _logistic(g: Graph, x: str) -> str:
-    e = g.add("Exp", g.add("Neg", g.add("Abs", x)))
-    upper = g.add("Where", g.add("GreaterOrEqual", x, 0.0), 1.0, e)
-    return g.add("Div", upper, g.add("Add", 1.0, e))
-
-
-def _fill(g: Graph, closure: FilteredDragClosure) -> None:
+def fill_drag(g: Graph, closure: FilteredDragClosure) -> None:
+    """Kept fractions of the markers."""
     features = _features(g, closure)
     gate = _gate(g, closure.gate)
-    predictor = closure.predictor
-    learnt = isinstance(predictor, Network)
-    if isinstance(predictor, Network):
-        raw = network_nodes(g, predictor, features)
-    else:
-        raw = forest_nodes(g, predictor, features)
+    learnt = isinstance(closure.predictor, Network)
+    raw = learnt_nodes(g, closure.predictor, features)
     columns = [
         g.add("Gather", raw, np.array(k, dtype=np.int64), axis=1)
         for k in range(closure.markers.outputs)
@@ -107,45 +92,13 @@ def _fill(g: Graph, closure: FilteredDragClosure) -> None:
         kept.append(g.add("Exp", g.add("Mul", gate, g.add("Sub", log, parcels))))
     share = g.add("Mul", 0.0, gate)
     if closure.markers.linear:
-        share = g.add("Mul", g.add("Mul", gate, SHARE_BOUND), _logistic(g, columns[2]))
+        share = g.add("Mul", g.add("Mul", gate, SHARE_BOUND), logistic_nodes(g, columns[2]))
     spread = columns[-1]
     if learnt:
-        spread = g.add("Mul", SPREAD_BOUND, _logistic(g, spread))
+        spread = g.add("Mul", SPREAD_BOUND, logistic_nodes(g, spread))
     stderr = g.add("Mul", kept[0], g.add("Mul", gate, spread))
     valid = range_nodes(g, closure.markers.markers)
     for name, value in zip(OUTPUTS, (*kept, share, stderr), strict=True):
         g.add("Where", valid, value, np.nan, out=name)
     far = g.add("And", g.add("Greater", gate, 0.0), outside_nodes(g, closure.domain, features))
     g.add("Or", far, g.add("Not", valid), out="extrapolates")
-
-
-def export_drag_onnx(
-    closure: FilteredDragClosure, path: str | os.PathLike[str], name: str | None = None
-) -> Path:
-    """Write a closure of filtered drag as an ONNX graph.
-
-    Parameters
-    ----------
-    closure : FilteredDragClosure
-        What to export.
-    path : path
-        File to write.
-    name : str, optional
-        Name of the graph; made from the closure by default.
-
-    Returns
-    -------
-    file : Path
-        Inputs: the markers by name, ``parcels`` too, each float64 [N]. Outputs: ``kept_along``,
-        ``kept_across``, ``share`` and ``stderr``, float64 [N], NaN where a marker is out of range;
-        ``extrapolates``, bool [N]. The gate is inside.
-
-    Raises
-    ------
-    OutputError
-        If the file cannot be written.
-    """
-    word = export_name(closure, name)
-    g = Graph()
-    _fill(g, closure)
-    return write_model(g, closure, closure.markers.markers, OUTPUTS, path, word)
