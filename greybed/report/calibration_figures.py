@@ -128,7 +128,7 @@ def pair_figure(study: Study, found: Answer, axes_of: tuple[int, int]) -> Markup
         level = found.posterior.level()
         inside = found.posterior.density >= level
         for mask, colour, label in (
-            (~inside, GRID, "outside the 90 % region"), (inside, FIRST, "90 % region"),
+            (~inside, GRID, "outside it"), (inside, FIRST, "90 % region"),
         ):  # fmt: skip
             rows = values[mask][::step]
             axes.plot(rows[:, i], rows[:, j], ".", color=colour, markersize=2.5, label=label)
@@ -142,7 +142,7 @@ def pair_figure(study: Study, found: Answer, axes_of: tuple[int, int]) -> Markup
                 set_scale("log")
         axes.set_xlabel(_label(names[i]))
         axes.set_ylabel(_label(names[j]))
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3, markerscale=1.6)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2, markerscale=1.6)
         return to_svg(figure, f"posterior of {names[i]} and {names[j]}")
 
 
@@ -178,8 +178,9 @@ def sensitivity_figure(study: Study, found: Answer) -> Markup:
         for r, label in enumerate(labels):
             for c in range(len(names)):
                 share = float(np.clip(found.sobol_total[label][c], 0.0, 1.0))
-                axes.barh(r, 0.92 * share, left=c, height=0.6, color=FIRST)
-                axes.text(c + 0.94, r, f"{share:.2f}", ha="right", va="center", size=8, color=INK)
+                axes.barh(r, 0.92 * share, left=c, height=0.6, color=FIRST,
+                          alpha=0.45, linewidth=0.0)  # fmt: skip
+                axes.text(c + 0.04, r, f"{share:.2f}", ha="left", va="center", size=8, color=INK)
         axes.set_xticks(np.arange(len(names)) + 0.46)
         axes.set_xticklabels([_label(n) for n in names], rotation=20, ha="right")
         axes.set_yticks(range(len(labels)))

@@ -13,6 +13,7 @@ from greybed.calibration.experiments.case import CaseExperiment, put
 from greybed.calibration.experiments.command import CommandExperiment
 from greybed.calibration.experiments.drum import avalanches
 from greybed.calibration.experiments.flows import seen_area
+from greybed.calibration.experiments.heaps import flank_angle
 from greybed.calibration.experiments.python import PythonExperiment
 from greybed.calibration.runs import attempt_run
 from greybed.core.config import build
@@ -193,3 +194,12 @@ def test_the_visible_area_of_discs():
     )
     assert seen_area(np.zeros((9, 2)), np.full(9, 0.3)) == pytest.approx(math.pi * 0.09, rel=0.08)
     assert seen_area(np.zeros((0, 2)), np.zeros(0)) == 0.0
+
+
+def test_the_angle_of_a_slope_of_few_bins():
+    x = np.linspace(0.0, 0.05, 6)
+    z = np.clip(0.03 - np.tan(np.radians(35.0)) * x, 0.005, 0.025)
+    found = flank_angle({"position_m": x, "height_m": z})
+    assert found == pytest.approx(35.0, abs=6.0)  # neighbours reach into the flat ends
+    with pytest.raises(RunFailed, match="fewer than three bins"):
+        flank_angle({"position_m": x[:2], "height_m": z[:2]})
