@@ -130,8 +130,8 @@ class DrawDownBox(Grains):
 def flank_angle(profile: Mapping[str, Any]) -> float:
     """Angle of a slope that falls from left to right, of a slice of few grains [degrees].
 
-    A straight line through the bins of a tenth to nine tenths of the height and their neighbours,
-    three at least; that of greybed.dem takes 20 to 80 % and refuses slopes of so few bins.
+    A straight line through the bins of a tenth to nine tenths of the height, and their neighbours
+    where these are fewer than three; that of greybed.dem takes 20 to 80 % and refuses slopes of so few bins.
 
     Raises
     ------
@@ -144,7 +144,8 @@ def flank_angle(profile: Mapping[str, Any]) -> float:
         raise RunFailed("fewer than three bins of the slope hold grains")
     low, high = float(z.min()), float(z.max())
     inside = (z > low + 0.1 * (high - low)) & (z < high - 0.1 * (high - low))
-    inside = np.convolve(inside, [1, 1, 1], "same") > 0
+    if inside.sum() < 3:
+        inside = np.convolve(inside, [1, 1, 1], "same") > 0
     if inside.sum() < 3:
         inside[:] = True
     return math.degrees(math.atan(-float(np.polyfit(x[inside], z[inside], 1)[0])))
