@@ -1,9 +1,12 @@
 """A small fluidised bed of 9,240 spheres: python examples/fluidised_bed/khawaja.py --out DIR.
 
-The bed of Khawaja and of Muller's experiments: 1.2 mm, 1000 kg/m3, 43.2 x 10 x 124.8 mm, cells
-12 x 1 x 26, air at 0.9 m/s. Spheres are softer than seeds, Young's modulus 1 MPa, so that a contact
-takes some 20 steps of 20 microseconds. Writes history.csv and summary.json: height of the bed
-(twice that of its centre of mass), pressure drop, time spent. Minutes on one core.
+Case B of Khawaja, J. Comput. Multiphase Flows 7 (2015) 227, with the numbers that
+CFDEMcoupling-PFM has for it (tutorials/cfdemSolverPiso/bubblingFluidizedBed): 1.2 mm, 1000 kg/m3,
+a box of 43.2 x 10 x 124.8 mm, cells 12 x 1 x 26, air of 1.13 kg/m3 that rises to 0.66 m/s within
+0.1 s and slides along walls, front and back without friction. Spheres are softer than there,
+Young's modulus 1 MPa instead of 120 MPa, so that a contact takes some 20 steps of 20 microseconds.
+Writes history.csv, khawaja.png and summary.json: heights of the bed, pressure drop, time spent.
+Minutes on one core.
 """
 
 from __future__ import annotations
@@ -18,16 +21,18 @@ from greybed.cfd.boundaries import Inflow, Outlet, Wall
 from greybed.cfd.fluid import Fluid
 from greybed.cfd.gas import GasSolver
 from greybed.cfd.grid import Grid
-from greybed.core import box_walls
+from greybed.core import Plane
 from greybed.core.files import output_folder, write_summary
 from greybed.coupling.drag_exchange import Settings
 from greybed.coupling.gas_particles import GasParticles
 from greybed.dem import Contact, Material, Simulation, SolidWall
 
 N, D, SIZE, CELLS = 9240, 1.2e-3, (0.0432, 0.010, 0.1248), (12, 1, 26)
-SPEED, AIR = 0.9, Fluid(density=1.2, viscosity=1.8e-5)
-SEED = Material(1000.0, 1e6, 0.3, "seed")
+SPEED, AIR = 0.66, Fluid(density=1.13, viscosity=1.13 * 14.88e-6)
+RAMP = 0.1  # of the inflow [s]
+SEED, SMOOTH = Material(1000.0, 1e6, 0.3, "seed"), Material(1000.0, 1e6, 0.3, "smooth")
 SETTLE = 10_000  # steps
+MEASURED = 0.050  # height of the bed in flow, by the same source [m]
 
 
 def particles(threads: int | None = None) -> Simulation:
@@ -39,17 +44,34 @@ def particles(threads: int | None = None) -> Simulation:
     rng = np.random.default_rng(0)
     centres = np.array([SIZE[0] / nx, SIZE[1] / ny, 1.25e-3]) * (at + 0.5)
     centres += rng.uniform(-2e-5, 2e-5, at.shape) + [0.0, 0.0, 1e-4]
+    walls = []
+    for axis, name in enumerate("xyz"):
+        for end, inwards in ((0.0, 1.0), (SIZE[axis], -1.0)):
+            point, normal = [0.0] * 3, [0.0] * 3
+            point[axis], normal[axis] = end, inwards
+            wall = Plane((point[0], point[1], point[2]), (normal[0], normal[1], normal[2]),
+                         f"{name} = {end:g} m")  # fmt: skip
+            walls.append(SolidWall(wall, "smooth" if name == "y" else "seed"))
+    contacts = {("seed", "seed"): Contact(0.986, 0.1), ("seed", "smooth"): Contact(0.986, 0.0)}
     return Simulation(
-        centres, 0.5 * D, SEED, Contact(0.98, 0.1), time_step=2e-5, threads=threads,
-        walls=[SolidWall(w) for w in box_walls((0.0, 0.0, 0.0), SIZE)],
-    )  # fmt: skip
+        centres, 0.5 * D, [SEED, SMOOTH], contacts, time_step=2e-5, threads=threads, walls=walls
+    )
 
 
-def with_gas(simulation: Simulation, drag: str = "bvk") -> GasParticles:
+def with_gas(
+    simulation: Simulation, drag: str = "bvk", speed: float = SPEED, budget: bool = False
+) -> GasParticles:
     """The same with air from below."""
-    sides = {"z-": Inflow(SPEED), "z+": Outlet(), "x-": Wall(), "x+": Wall()}
-    gas = GasSolver(Grid(cells=CELLS, upper=SIZE), sides, AIR)
+    slip = Wall(slip=True)
+    sides = {"z-": Inflow(speed), "z+": Outlet(), "x-": slip, "x+": slip}
+    gas = GasSolver(Grid(cells=CELLS, upper=SIZE), sides, AIR, budget=budget)
     return GasParticles(gas, simulation, Settings(drag=drag))
+
+
+def top(centres: np.ndarray) -> float:
+    """Height of the bed's surface: mean over 12 columns of their fifth highest sphere [m]."""
+    column = np.minimum((centres[:, 0] / SIZE[0] * 12).astype(int), 11)
+    return float(np.mean([np.sort(centres[column == k, 2])[-5] for k in range(12)])) + 0.5 * D
 
 
 def main() -> None:
@@ -62,26 +84,56 @@ def main() -> None:
     out = output_folder(given.out)
     sim = particles(given.threads)
     sim.run(SETTLE)
-    both = with_gas(sim, given.drag)
+    settled = (2.0 * float(sim.centres[:, 2].mean()), top(sim.centres))
+    both = with_gas(sim, given.drag, 0.01 * SPEED)
     started, cpu = time.perf_counter(), time.process_time()
     rows, worst = [], 0.0
     while both.time < given.time:
+        both.gas.set_boundary("z-", Inflow(SPEED * min(1.0, 0.01 + both.time / RAMP)))
         report = both.step()
         worst = max(worst, report.defect)
-        height = 2.0 * float(sim.centres[:, 2].mean())
-        rows.append((both.time, height, float(both.gas.pressure[0].mean()), report.contact_steps))
+        p = both.gas.pressure.mean(axis=(1, 2))
+        rows.append((both.time, 2.0 * float(sim.centres[:, 2].mean()), top(sim.centres),
+                     1.5 * p[0] - 0.5 * p[1], report.contact_steps))  # fmt: skip
     table = np.array(rows)
-    np.savetxt(out / "history.csv", table, delimiter=",", comments="",
-               header="time [s],height [m],pressure_drop [Pa],contact_steps")  # fmt: skip
+    header = "time [s],height [m],surface [m],pressure_drop [Pa],contact_steps"
+    np.savetxt(out / "history.csv", table, delimiter=",", comments="", header=header)
     late = table[:, 0] > 0.4 * given.time
     weight = 9.81 * float(sim.masses.sum()) / (SIZE[0] * SIZE[1])
     write_summary(out, "khawaja", {
         "particles": N, "time": both.time, "gas_steps": both.steps,
-        "settled_height": float(rows[0][1]), "mean_height": float(table[late, 1].mean()),
-        "mean_pressure_drop": float(table[late, 2].mean()), "weight_over_area": weight,
+        "settled_height": settled[0], "settled_surface": settled[1],
+        "mean_height": float(table[late, 1].mean()), "mean_surface": float(table[late, 2].mean()),
+        "surface_quartiles": np.quantile(table[late, 2], (0.25, 0.5, 0.75)).tolist(),
+        "measured_height": MEASURED,
+        "mean_pressure_drop": float(table[late, 3].mean()), "weight_over_area": weight,
         "largest_momentum_defect": worst, "wall_seconds": time.perf_counter() - started,
         "cpu_seconds": time.process_time() - cpu,
     })  # fmt: skip
+    draw(table, weight, sim, both, out / "khawaja.png")
+
+
+def draw(table: np.ndarray, weight: float, sim: Simulation, both: GasParticles, path: Path) -> None:
+    """Heights and pressure drop over time, and the bed at the end."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(1, 3, figsize=(11, 4), width_ratios=(2, 2, 1), layout="constrained")
+    axes[0].plot(table[:, 0], 1e3 * table[:, 2], label="surface")
+    axes[0].plot(table[:, 0], 1e3 * table[:, 1], label="twice the centre of mass")
+    axes[0].axhline(1e3 * MEASURED, color="k", ls="--", lw=0.8, label="measured")
+    axes[0].set(xlabel="time [s]", ylabel="height [mm]", ylim=(0, None))
+    axes[0].legend(frameon=False)
+    axes[1].plot(table[:, 0], table[:, 3] / weight, lw=0.8)
+    axes[1].axhline(1.0, color="k", ls="--", lw=0.8)
+    axes[1].set(xlabel="time [s]", ylabel="pressure drop over the bed's weight [-]")
+    box = (0.0, 1e3 * SIZE[0], 0.0, 1e3 * SIZE[2])
+    axes[2].imshow(both.void[:, 0], origin="lower", extent=box, cmap="Greys_r", vmin=0.3, vmax=1.0)
+    axes[2].plot(*(1e3 * sim.centres[:, (0, 2)]).T, ".", ms=0.8, color="#d1602b")
+    axes[2].set(xlabel="x [mm]", ylabel="z [mm]", title=f"{both.time:.2f} s")
+    figure.savefig(path, dpi=110)
 
 
 if __name__ == "__main__":

@@ -27,11 +27,25 @@ VERBS = {
     "train": ("train", "train a closure from a data set"),
     "check": ("check", "check a closure's limiting cases and golden rows"),
     "export": ("export", "export a closure to C++ or ONNX"),
+    "campaign": ("campaign", "run a case with many values, on one machine or a cluster"),
+    "host": ("host", "put a closure into LAMMPS, LIGGGHTS or OpenFOAM"),
     "simulate": ("simulate", "run a coupled case from a TOML file"),
     "calibrate": ("calibrate", "find parameters from measured bulk behaviour, and their ambiguity"),
     "diagnose": ("diagnose", "trace a residual to the effect that a model lacks"),
     "blindtest": ("blindtest", "test the residual analysis on sealed data sets"),
+    "doctor": ("doctor", "check the installation, compilers and engines"),
 }
+
+
+# What a newcomer sees without arguments.
+FIRST = """Grey-box closures for particle beds. Three ways in:
+
+  greybed doctor                              what is installed, and what each part is for
+  greybed quickstart --out runs/quickstart    traced beds, trained closures, a page: two minutes
+  greybed simulate CASE.toml --out runs/mine  a case; those below examples/ are there to start from
+
+greybed --help lists the verbs, greybed VERB --help explains one.
+"""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -59,7 +73,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one verb; returns 0 done, 1 a check failed, 2 bad input, 130 interrupted."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     parser = _parser()
-    if not words or words[0].startswith("-"):
+    if not words:
+        print(FIRST, end="")
+        return 0
+    if words[0].startswith("-"):
         parser.parse_args(words)
         parser.print_help()
         return 0

@@ -6,7 +6,8 @@ frames.pvd with its frames (or frames.vtkhdf), and summary.json; stopped by Ctrl
 goes on from its checkpoint when the same command is given again, and ends with the same bits.
 kind = "gas-particles" is particles in a gas, "gas" a gas alone, "two-fluid" gas and particles as
 two fluids; they write frames of the grid as frames.vtkhdf (gas_frames.vtkhdf beside particles).
---engine liggghts hands the same case to LIGGGHTS and reads its results back (docs/liggghts.md).
+--engine liggghts or lammps hands the same case to that engine and reads its results back
+(docs/liggghts.md, docs/hosts.md).
 
 examples:
   greybed simulate examples/heated_bed/case.toml --out runs/heated_bed
@@ -22,8 +23,8 @@ from pathlib import Path
 
 import numpy as np
 
+from greybed.cli.simulate_engine import run_engine
 from greybed.cli.simulate_flow import run_flow
-from greybed.cli.simulate_liggghts import run_liggghts
 from greybed.cli.simulate_particles import run_particles
 from greybed.core.config import read_toml
 from greybed.core.errors import InputError
@@ -41,10 +42,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--threads", type=int, help="threads (default: all); changes no bit")
     parser.add_argument("--movie", action="store_true", help="movie.gif of the frames")
     parser.add_argument(
-        "--engine", choices=("greybed", "liggghts"), default="greybed",
-        help="particles: who moves them (default: greybed); liggghts runs through MPI",
+        "--engine", choices=("greybed", "liggghts", "lammps"), default="greybed",
+        help="particles: who moves them (default: greybed); the others run through MPI",
     )  # fmt: skip
-    parser.add_argument("--ranks", type=int, help="liggghts: MPI ranks (default: 1)")
+    parser.add_argument("--ranks", type=int, help="liggghts, lammps: MPI ranks (default: 1)")
+    parser.add_argument(
+        "--plugin", type=Path, metavar="FILE", help="lammps: plugin made by greybed host"
+    )
+    parser.add_argument(
+        "--fix", action="append", default=[], metavar="WORDS",
+        help="lammps: a fix of the plugin for all particles; may be repeated",
+    )  # fmt: skip
     parser.add_argument("--quiet", action="store_true", help="no progress bars")
 
 
@@ -60,12 +68,14 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(
             f"--threads = {options.threads} [-] must be at least 1; leave it out for all."
         )
-    if options.ranks is not None and options.engine != "liggghts":
-        raise InputError("--ranks is for --engine liggghts only; take --threads, or leave it out.")
+    if options.ranks is not None and options.engine == "greybed":
+        raise InputError(
+            "--ranks is for --engine liggghts or lammps only; take --threads, or leave it out."
+        )
     kind = read_toml(options.case).get("kind")
-    if kind == "particles" and options.engine == "liggghts":
-        return run_liggghts(options)
-    if options.engine != "greybed":
+    if kind == "particles" and options.engine != "greybed":
+        return run_engine(options)
+    if options.engine != "greybed" or options.plugin or options.fix:
         raise InputError(f"--engine {options.engine} is for particles only; leave it out.")
     if kind in ("particles", "gas-particles"):
         return run_particles(options, gas=kind == "gas-particles")

@@ -49,8 +49,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--workers", type=int, metavar="N", help="processes that share the threads")
     parser.add_argument(
         "--scheduler",
-        metavar="ADDRESS",
-        help="dask.distributed scheduler whose workers trace, such as tcp://host:8786",
+        metavar="WHERE",
+        help="who traces: local, the address of a dask.distributed scheduler such as "
+        "tcp://host:8786, or a TOML file of Slurm jobs",
     )
     parser.add_argument(
         "--wall",

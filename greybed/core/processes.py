@@ -27,8 +27,13 @@ def processes(
     )
 
 
-def _begin(start: Callable[..., None] | None, about: tuple[Any, ...]) -> None:
+def end_with_parent() -> None:
+    """End this process when its parent ends, from now on."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _begin(start: Callable[..., None] | None, about: tuple[Any, ...]) -> None:
+    end_with_parent()
     if start is not None:
         start(*about)
 

@@ -1,73 +1,168 @@
-"""Compiled linear interpolation from staggered faces to particles, and its transpose."""
+"""Compiled linear interpolation from staggered faces to particles, its transpose, and forces."""
 
 import math
 
+import numpy as np
 from numba import njit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
+# Arrays of faces have one layer more around them here, so that no place needs a look at the rims:
+# beyond the outer points the value there holds, and a ring goes on. Functions that get arrays have
+# no branches: numba would count references to the arrays at each of them.
+
+
+@njit(**_OPTIONS)
+def surround(field, at_z, at_y, at_x, out):
+    """Fill ``out`` with the values of ``field`` whose numbers the three lists have."""
+    for k in range(at_z.size):
+        for j in range(at_y.size):
+            for i in range(at_x.size):
+                out[k, j, i] = field[at_z[k], at_y[j], at_x[i]]
+
+
+@njit(**_OPTIONS)
+def gather(sums, at_z, at_y, at_x, first, second):
+    """Add the two values of each place of ``sums`` to where the lists say: the transpose."""
+    for k in range(at_z.size):
+        for j in range(at_y.size):
+            for i in range(at_x.size):
+                first[at_z[k], at_y[j], at_x[i]] += sums[k, j, i, 0]
+                second[at_z[k], at_y[j], at_x[i]] += sums[k, j, i, 1]
+
+
 @njit(inline="always", **_OPTIONS)
-def _between(x, lower, spacing, n, periodic, faces):
-    """Numbers of the two points of an axis beside x, and the weight of the second one.
-
-    Along the axis that faces cut they are n + 1 points (n on a ring) from the rim on; else they
-    are the centres, and beyond the outer ones the value there holds.
-    """
-    at = (x - lower) / spacing
-    if not faces:
-        at -= 0.5
+def _below(at):
+    """Number of the point below a place, in an array that is surrounded, and what is beyond it."""
     low = math.floor(at)
-    weight = at - low
-    i = int(low)
-    if periodic:
-        return i % n, (i + 1) % n, weight
-    last = n if faces else n - 1
-    if i < 0:
-        return 0, 0, 0.0
-    if i >= last:
-        return last, last, 0.0
-    return i, i + 1, weight
+    return low + 1, at - low
+
+
+@njit(inline="always", **_OPTIONS)
+def _in_turns(x, n, periodic):
+    return x - n * math.floor(x / n) if periodic else x
 
 
 @njit(**_OPTIONS)
-def read_faces(place, axis, lower, spacing, cells, periodic, field, out):
-    """Fill ``out`` (n,) with the face values of one component at the particles."""
-    for p in range(place.shape[0]):
-        i, i1, a = _between(place[p, 0], lower[0], spacing[0], cells[0], periodic[0], axis == 0)
-        j, j1, b = _between(place[p, 1], lower[1], spacing[1], cells[1], periodic[1], axis == 1)
-        k, k1, c = _between(place[p, 2], lower[2], spacing[2], cells[2], periodic[2], axis == 2)
-        low = (field[k, j, i] * (1.0 - a) + field[k, j, i1] * a) * (1.0 - b)
-        low += (field[k, j1, i] * (1.0 - a) + field[k, j1, i1] * a) * b
-        high = (field[k1, j, i] * (1.0 - a) + field[k1, j, i1] * a) * (1.0 - b)
-        high += (field[k1, j1, i] * (1.0 - a) + field[k1, j1, i1] * a) * b
-        out[p] = low * (1.0 - c) + high * c
+def _row(field, at, a):
+    # Numbers without sign: others are taken to count from the end, which costs a look at each.
+    m = np.uint64(at)
+    return field[m] * (1.0 - a) + field[m + np.uint64(1)] * a
 
 
 @njit(**_OPTIONS)
-def give_to_faces(place, axis, lower, spacing, cells, periodic, values, second, out, out2):
-    """Add two values of each particle to the faces that :func:`read_faces` reads."""
+def _weighted(field, i, a, j, b, k, c, nx, ny):
+    at, up = (k * ny + j) * nx + i, ny * nx
+    low = _row(field, at, a) * (1.0 - b) + _row(field, at + nx, a) * b
+    high = _row(field, at + up, a) * (1.0 - b) + _row(field, at + up + nx, a) * b
+    return low * (1.0 - c) + high * c
+
+
+@njit(**_OPTIONS)
+def read_faces(place, lower, spacing, cells, periodic, u, v, w, out):
+    """Fill ``out`` (n, 3) with values of faces, surrounded and flat, at the particles."""
+    ox, oy, oz = 1.0 / spacing[0], 1.0 / spacing[1], 1.0 / spacing[2]
+    nx, ny, nz = cells[0], cells[1], cells[2]
+    px, py, pz = periodic[0], periodic[1], periodic[2]
     for p in range(place.shape[0]):
-        i, i1, a = _between(place[p, 0], lower[0], spacing[0], cells[0], periodic[0], axis == 0)
-        j, j1, b = _between(place[p, 1], lower[1], spacing[1], cells[1], periodic[1], axis == 1)
-        k, k1, c = _between(place[p, 2], lower[2], spacing[2], cells[2], periodic[2], axis == 2)
-        v, w = values[p], second[p]
-        for kk, wz in ((k, 1.0 - c), (k1, c)):
-            for jj, wy in ((j, 1.0 - b), (j1, b)):
-                for ii, wx in ((i, 1.0 - a), (i1, a)):
-                    weight = wx * wy * wz
-                    out[kk, jj, ii] += weight * v
-                    out2[kk, jj, ii] += weight * w
-    if periodic[axis]:  # the last face is the first one
-        if axis == 0:
-            out[:, :, cells[0]] = out[:, :, 0]
-            out2[:, :, cells[0]] = out2[:, :, 0]
-        elif axis == 1:
-            out[:, cells[1], :] = out[:, 0, :]
-            out2[:, cells[1], :] = out2[:, 0, :]
-        else:
-            out[cells[2], :, :] = out[0, :, :]
-            out2[cells[2], :, :] = out2[0, :, :]
+        x = _in_turns((place[p, 0] - lower[0]) * ox, nx, px)
+        y = _in_turns((place[p, 1] - lower[1]) * oy, ny, py)
+        z = _in_turns((place[p, 2] - lower[2]) * oz, nz, pz)
+        # Points of an axis are faces for the velocity along it, centres for the others; all of an
+        # axis of one cell is at its centre.
+        (fi, fa), (fj, fb), (fk, fc) = _below(x), _below(y), _below(z)
+        i, a = _below(x - 0.5) if nx > 1 else (1, 0.0)
+        j, b = _below(y - 0.5) if ny > 1 else (1, 0.0)
+        k, c = _below(z - 0.5) if nz > 1 else (1, 0.0)
+        out[p, 0] = _weighted(u, fi, fa, j, b, k, c, nx + 3, ny + 2)
+        out[p, 1] = _weighted(v, i, a, fj, fb, k, c, nx + 2, ny + 3)
+        out[p, 2] = _weighted(w, i, a, j, b, fk, fc, nx + 2, ny + 2)
+
+
+@njit(**_OPTIONS)
+def _add(sums, at, a, weight, first, second):
+    m = np.uint64(2 * at)
+    low, high = weight * (1.0 - a), weight * a
+    sums[m] += low * first
+    sums[m + np.uint64(1)] += low * second
+    sums[m + np.uint64(2)] += high * first
+    sums[m + np.uint64(3)] += high * second
+
+
+@njit(**_OPTIONS)
+def _spread(sums, at, up, a, c, weight, first, second):
+    _add(sums, at, a, weight * (1.0 - c), first, second)
+    _add(sums, at + up, a, weight * c, first, second)
+
+
+@njit(**_OPTIONS)
+def give_to_faces(place, lower, spacing, cells, periodic, k, target, u, v, w):
+    """Add ``k`` (n, 3), or (n, 1), and k times ``target`` (n, 3) to the faces that are read.
+
+    ``u``, ``v`` and ``w`` are surrounded, flat, and have the two sums of a face side by side.
+    """
+    ox, oy, oz = 1.0 / spacing[0], 1.0 / spacing[1], 1.0 / spacing[2]
+    nx, ny, nz = cells[0], cells[1], cells[2]
+    px, py, pz = periodic[0], periodic[1], periodic[2]
+    own = 1 if k.shape[1] == 3 else 0
+    # From a row to the next one, and to the one above, in each array.
+    ru, rv, rw = nx + 3, nx + 2, nx + 2
+    uu, uv, uw = ru * (ny + 2), rv * (ny + 3), rw * (ny + 2)
+    for p in range(place.shape[0]):
+        x = _in_turns((place[p, 0] - lower[0]) * ox, nx, px)
+        y = _in_turns((place[p, 1] - lower[1]) * oy, ny, py)
+        z = _in_turns((place[p, 2] - lower[2]) * oz, nz, pz)
+        (fi, fa), (fj, fb), (fk, fc) = _below(x), _below(y), _below(z)
+        i, a = _below(x - 0.5) if nx > 1 else (1, 0.0)
+        j, b = _below(y - 0.5) if ny > 1 else (1, 0.0)
+        m, c = _below(z - 0.5) if nz > 1 else (1, 0.0)
+        kx, ky, kz = k[p, 0], k[p, own], k[p, 2 * own]
+        gx, gy, gz = kx * target[p, 0], ky * target[p, 1], kz * target[p, 2]
+        au, av, aw = m * uu + j * ru + fi, m * uv + fj * rv + i, fk * uw + j * rw + i
+        _spread(u, au, uu, fa, c, 1.0 - b, kx, gx)
+        _spread(v, av, uv, a, c, 1.0 - fb, ky, gy)
+        _spread(w, aw, uw, a, fc, 1.0 - b, kz, gz)
+        _spread(v, av + rv, uv, a, c, fb, ky, gy)
+        if b != 0.0:  # it is 0 where all is in one row
+            _spread(u, au + ru, uu, fa, c, b, kx, gx)
+            _spread(w, aw + rw, uw, a, fc, b, kz, gz)
+
+
+@njit(**_OPTIONS)
+def forces_of(
+    k, seen, target, steady, first, cell, volume, slopes, lift, place, order, out, sums
+):  # fmt: skip
+    """Fill ``out`` (n, 3), in the order of the input, with all that the gas does to particles.
+
+    The force is k (seen - target) + steady - sum of volumes times slopes + lift r^3, ``steady`` of
+    (n, 3) and ``slopes`` of (cells, 3), or none, (0, 3). ``sums`` (3, 3) gets the sums of the
+    first part, of its absolutes, and of the third.
+    """
+    own = 1 if k.shape[1] == 3 else 0
+    further, pressure = steady.shape[0] > 0, slopes.shape[0] > 0
+    fx = fy = fz = ax = ay = az = gx = gy = gz = 0.0
+    for p in range(place.shape[0]):
+        x = k[p, 0] * (seen[p, 0] - target[p, 0])
+        y = k[p, own] * (seen[p, 1] - target[p, 1])
+        z = k[p, 2 * own] * (seen[p, 2] - target[p, 2])
+        fx, fy, fz = fx + x, fy + y, fz + z
+        ax, ay, az = ax + abs(x), ay + abs(y), az + abs(z)
+        if further:
+            x, y, z = x + steady[p, 0], y + steady[p, 1], z + steady[p, 2]
+        px = py = pz = 0.0
+        if pressure:
+            for m in range(first[p], first[p + 1]):
+                v, at = volume[m], cell[m]
+                px, py, pz = px - v * slopes[at, 0], py - v * slopes[at, 1], pz - v * slopes[at, 2]
+            gx, gy, gz = gx + px, gy + py, gz + pz
+        cube, at = place[p, 3] ** 3, order[p]
+        out[at, 0] = x + px + lift[0] * cube
+        out[at, 1] = y + py + lift[1] * cube
+        out[at, 2] = z + pz + lift[2] * cube
+    for row, found in enumerate(((fx, fy, fz), (ax, ay, az), (gx, gy, gz))):
+        for c in range(3):
+            sums[row, c] = found[c]
 
 
 @njit(**_OPTIONS)

@@ -80,27 +80,26 @@ def _above(radius, i, a, j, b, k, c):
     return wedge(radius, a, b) if k == 0 else corner(radius, a, b, c)
 
 
-@njit(**_OPTIONS)
-def _planes(low, high, lower, spacing, count, periodic):
-    first = math.floor((low - lower) / spacing)
-    last = math.floor((high - lower) / spacing)
+@njit(inline="always", **_OPTIONS)
+def _planes(low, high, lower, over, count, periodic):
+    first = math.floor((low - lower) * over)
+    last = math.floor((high - lower) * over)
     if not periodic:  # what reaches across the rim stays in the cell there
         first, last = min(max(first, 0), count - 1), min(max(last, 0), count - 1)
-    return int(first), int(last)
+    return first, last
+
+
+@njit(inline="always", **_OPTIONS)
+def _wrapped(at, count):
+    return at if 0 <= at < count else at % count
 
 
 @njit(**_OPTIONS)
-def _cells_of_sphere(x, y, z, r, lower, spacing, cells, periodic, table, cell, volume, at):
+def _cells_of_sphere(
+    x, y, z, r, x0, y0, z0, mx, my, mz, lower, spacing, cells, table, cell, volume, at
+):  # fmt: skip
     """Write a sphere's cells and volumes from ``at`` on; the place after the last one."""
     nx, ny, nz = cells[0], cells[1], cells[2]
-    x0, x1 = _planes(x - r, x + r, lower[0], spacing[0], nx, periodic[0])
-    y0, y1 = _planes(y - r, y + r, lower[1], spacing[1], ny, periodic[1])
-    z0, z1 = _planes(z - r, z + r, lower[2], spacing[2], nz, periodic[2])
-    if x0 == x1 and y0 == y1 and z0 == z1:
-        cell[at] = ((z0 % nz) * ny + y0 % ny) * nx + x0 % nx
-        volume[at] = 4.0 / 3.0 * math.pi * r**3
-        return at + 1
-    mx, my, mz = x1 - x0 + 1, y1 - y0 + 1, z1 - z0 + 1
     for k in range(mz + 1):
         c = lower[2] + (z0 + k) * spacing[2] - z
         for j in range(my + 1):
@@ -119,48 +118,65 @@ def _cells_of_sphere(x, y, z, r, lower, spacing, cells, periodic, table, cell, v
                 far = table[k + 1, j, h] - table[k + 1, j, h + 1]
                 far -= table[k + 1, j + 1, h] - table[k + 1, j + 1, h + 1]
                 if near - far > 0.0:
-                    cell[at] = (((z0 + k) % nz) * ny + (y0 + j) % ny) * nx + (x0 + h) % nx
+                    row = _wrapped(z0 + k, nz) * ny + _wrapped(y0 + j, ny)
+                    cell[at] = row * nx + _wrapped(x0 + h, nx)
                     volume[at] = near - far
                     at += 1
     return at
 
 
 @njit(**_OPTIONS)
-def outside(place, lower, spacing, cells, periodic):
-    """The first sphere whose centre is not in the grid, or -1."""
+def survey(place, lower, spacing, cells, periodic):
+    """The first sphere whose centre is not in the grid, or -1, and the largest radius."""
+    largest = 0.0
     for i in range(place.shape[0]):
+        largest = max(largest, place[i, 3])
         for axis in range(3):
             at = place[i, axis] - lower[axis]
             if not (periodic[axis] or (at >= 0.0 and at <= cells[axis] * spacing[axis])):
-                return i
-    return -1
-
-
-@njit(**_OPTIONS)
-def room(place, spacing):
-    """Cells along an axis that the largest sphere may reach, and entries of all spheres."""
-    most, entries = 1, 0
-    for i in range(place.shape[0]):
-        all_axes = 1
-        for axis in range(3):
-            across = int(2.0 * place[i, 3] / spacing[axis]) + 2
-            most = max(most, across)
-            all_axes *= across
-        entries += all_axes
-    return most, entries
+                return i, largest
+    return -1, largest
 
 
 @njit(**_OPTIONS)
 def overlaps(place, lower, spacing, cells, periodic, most, first, cell, volume):
     """Rows of cells and volumes of each sphere, ``first`` (n + 1,); the number of entries."""
     table = np.empty((most + 1, most + 1, most + 1))
+    nx, ny, nz = cells[0], cells[1], cells[2]
+    px, py, pz = periodic[0], periodic[1], periodic[2]
+    ox, oy, oz = 1.0 / spacing[0], 1.0 / spacing[1], 1.0 / spacing[2]
     at = 0
     for i in range(place.shape[0]):
         first[i] = at
-        at = _cells_of_sphere(
-            place[i, 0], place[i, 1], place[i, 2], place[i, 3], lower, spacing, cells, periodic,
-            table, cell, volume, at,
-        )  # fmt: skip
+        x, y, z, r = place[i, 0], place[i, 1], place[i, 2], place[i, 3]
+        x0, x1 = _planes(x - r, x + r, lower[0], ox, nx, px)
+        y0, y1 = _planes(y - r, y + r, lower[1], oy, ny, py)
+        z0, z1 = _planes(z - r, z + r, lower[2], oz, nz, pz)
+        across = (x1 - x0) + (y1 - y0) + (z1 - z0)
+        if across > 1:
+            at = _cells_of_sphere(
+                x, y, z, r, x0, y0, z0, x1 - x0 + 1, y1 - y0 + 1, z1 - z0 + 1, lower, spacing,
+                cells, table, cell, volume, at,
+            )  # fmt: skip
+            continue
+        # Most lie in one cell, or across one plane.
+        beyond = 0.0
+        if across == 1:
+            plane = lower[2] + z1 * spacing[2] - z
+            if x1 > x0:
+                plane = lower[0] + x1 * spacing[0] - x
+            elif y1 > y0:
+                plane = lower[1] + y1 * spacing[1] - y
+            beyond = cap(r, plane)
+        short = 4.0 / 3.0 * math.pi * r**3 - beyond
+        if short > 0.0:
+            cell[at] = (_wrapped(z0, nz) * ny + _wrapped(y0, ny)) * nx + _wrapped(x0, nx)
+            volume[at] = short
+            at += 1
+        if beyond > 0.0:
+            cell[at] = (_wrapped(z1, nz) * ny + _wrapped(y1, ny)) * nx + _wrapped(x1, nx)
+            volume[at] = beyond
+            at += 1
     first[place.shape[0]] = at
     return at
 
@@ -169,10 +185,11 @@ def overlaps(place, lower, spacing, cells, periodic, most, first, cell, volume):
 def centre_cells(place, lower, spacing, cells, periodic, first, cell, volume):
     """The same with each sphere in the cell of its centre."""
     nx, ny, nz = cells[0], cells[1], cells[2]
+    over = 1.0 / spacing
     for i in range(place.shape[0]):
-        x, _ = _planes(place[i, 0], place[i, 0], lower[0], spacing[0], nx, periodic[0])
-        y, _ = _planes(place[i, 1], place[i, 1], lower[1], spacing[1], ny, periodic[1])
-        z, _ = _planes(place[i, 2], place[i, 2], lower[2], spacing[2], nz, periodic[2])
+        x, _ = _planes(place[i, 0], place[i, 0], lower[0], over[0], nx, periodic[0])
+        y, _ = _planes(place[i, 1], place[i, 1], lower[1], over[1], ny, periodic[1])
+        z, _ = _planes(place[i, 2], place[i, 2], lower[2], over[2], nz, periodic[2])
         first[i], cell[i] = i, ((z % nz) * ny + y % ny) * nx + x % nx
         volume[i] = 4.0 / 3.0 * math.pi * place[i, 3] ** 3
     first[place.shape[0]] = place.shape[0]
@@ -193,7 +210,7 @@ def collect(first, cell, weight, field, out):
     """Fill ``out`` (n, k) with sums of weights times ``field`` (cells, k): the transpose."""
     for i in range(first.size - 1):
         for c in range(field.shape[1]):
-            out[i, c] = 0.0
-        for m in range(first[i], first[i + 1]):
-            for c in range(field.shape[1]):
-                out[i, c] += weight[m] * field[cell[m], c]
+            total = 0.0
+            for m in range(first[i], first[i + 1]):
+                total += weight[m] * field[cell[m], c]
+            out[i, c] = total

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
 from greybed.closures.drag import MIXTURES, DragLaw, drag_law, mixture_factor, sauter_mean
 from greybed.core.errors import InputError
+from greybed.coupling import _drag
 from greybed.coupling.filtered_drag import FilteredDrag
 from greybed.coupling.forces import LIFTS
 from greybed.coupling.void_fraction import METHODS
@@ -52,6 +54,11 @@ class Settings:
         Coefficient, 0.5 for spheres, 0 for none [-].
     lift : str
         ``none`` or ``saffman-mei``.
+    lubrication : float
+        Gap between surfaces within which films of the fluid act, in mean diameters; 0 for none.
+        See :func:`greybed.coupling.lubrication.lubrication` [-].
+    roughness : float
+        Films are no thinner than it, in mean diameters [-].
     correction : callable or FilteredDrag, optional
         ``H(phi, slip, size)`` for solid fractions (n,), slips (n, 3) and the edge of a cube of a
         cell's volume [m]: the fraction of drag that is kept. A
@@ -74,6 +81,8 @@ class Settings:
     buoyancy: bool = True
     added_mass: float = 0.0
     lift: str = "none"
+    lubrication: float = 0.0
+    roughness: float = 1e-3
     correction: Correction | FilteredDrag | None = None
 
     def __post_init__(self) -> None:
@@ -86,6 +95,7 @@ class Settings:
                 )
         for name, low, high in (
             ("width", 0.0, 1e3), ("least_void", 0.01, 0.99), ("added_mass", 0.0, 10.0),
+            ("lubrication", 0.0, 1.0), ("roughness", 1e-6, 0.1),
         ):  # fmt: skip
             value = getattr(self, name)
             if not (math.isfinite(value) and low <= value <= high):
@@ -139,30 +149,20 @@ def drag_terms(
     """
     if not len(d):
         return DragTerms(np.zeros(0), np.ones(0), void, np.zeros(0), 0.0)
-    phi = 1.0 - void
-    speed = np.sqrt((slip**2).sum(axis=1))
-    mean = d if settings.mixture == "none" else np.full_like(d, sauter_mean(d))
-    re = void * density * mean * speed / viscosity
     law = settings.law
-    outside = 0.0
-    if isinstance(law, DragLaw):
-        force, slope = law.with_slope(phi, re)
-        outside = float(law.outside(phi, re).mean())
+    if isinstance(law, DragLaw) and settings.mixture == "none":
+        re, coefficient, steepness = np.empty_like(d), np.empty_like(d), np.empty_like(d)
+        count, bad = _drag.of_law(
+            law.code, *map(float, law.solids), float(law.reynolds), np.ascontiguousarray(slip),
+            np.ascontiguousarray(void), np.ascontiguousarray(d), float(density), float(viscosity),
+            re, coefficient, steepness,
+        )  # fmt: skip
+        if bad >= 0:
+            _refuse(float(law(1.0 - void[bad], re[bad])), 1.0 - void[bad], re[bad])
+        outside = count / len(d)
     else:
-        force = np.asarray(law(phi, re), dtype=np.float64)
-        further = 1e-3 * np.maximum(re, 1e-6)
-        slope = re * (np.asarray(law(phi, re + further)) - force) / further
-    if settings.mixture != "none":
-        before = force
-        force = mixture_factor(settings.mixture, force, phi, d / mean)
-        slope = slope * force / before
-    if not (np.isfinite(force).all() and (force >= 0.0).all()):
-        who = int((~(np.isfinite(force) & (force >= 0.0))).argmax())
-        raise InputError(
-            f"the drag law gives F = {force[who]:g} at a solid fraction of {phi[who]:.3g} and Re = "
-            f"{re[who]:.3g} [-]; F must be finite and at least 0: take another law."
-        )
-    coefficient = 3.0 * math.pi * viscosity * d * void * force
+        re, coefficient, steepness, outside = _general(settings, slip, void, d, density, viscosity)
+    phi = 1.0 - void
     if isinstance(settings.correction, FilteredDrag):
         filtered = settings.correction
         factor, steep, push = filtered.particles(phi, slip, size, gradient)
@@ -175,5 +175,41 @@ def drag_terms(
         if kept.shape != phi.shape or not (np.isfinite(kept).all() and (kept >= 0.0).all()):
             raise InputError("the drag correction must give one finite number >= 0 per particle.")
         coefficient = coefficient * kept
+    return DragTerms(coefficient, steepness, void, re, outside)
+
+
+def _refuse(force: float, phi: float, re: float) -> NoReturn:
+    raise InputError(
+        f"the drag law gives F = {force:g} at a solid fraction of {phi:.3g} and Re = {re:.3g} [-]; "
+        "F must be finite and at least 0: take another law."
+    )
+
+
+def _general(
+    settings: Settings, slip: Array, void: Array, d: Array, density: float, viscosity: float
+) -> tuple[Array, Array, Array, float]:
+    """The same for any function, and for sizes that share drag."""
+    phi = 1.0 - void
+    speed = np.sqrt((slip**2).sum(axis=1))
+    mean = d if settings.mixture == "none" else np.full_like(d, sauter_mean(d))
+    re = void * density * mean * speed / viscosity
+    law = settings.law
+    outside = 0.0
+    if isinstance(law, DragLaw):
+        force, slope = law.with_slope(phi, re)
+        outside = float(np.count_nonzero(law.outside(phi, re))) / len(d)
+    else:
+        force = np.asarray(law(phi, re), dtype=np.float64)
+        further = 1e-3 * np.maximum(re, 1e-6)
+        slope = re * (np.asarray(law(phi, re + further)) - force) / further
+    if settings.mixture != "none":
+        before = force
+        force = mixture_factor(settings.mixture, force, phi, d / mean)
+        slope = slope * force / before
+    good = np.isfinite(force) & (force >= 0.0)
+    if not good.all():
+        who = int((~good).argmax())
+        _refuse(force[who], phi[who], re[who])
+    coefficient = 3.0 * math.pi * viscosity * d * void * force
     steepness = 1.0 + np.divide(slope, force, out=np.zeros_like(force), where=force > 0.0)
-    return DragTerms(coefficient, np.maximum(steepness, 0.5), void, re, outside)
+    return re, coefficient, np.maximum(steepness, 0.5), outside

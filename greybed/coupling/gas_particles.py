@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from greybed.core.errors import InputError
-from greybed.coupling import _exchange
+from greybed.coupling import _drag, _exchange
 from greybed.coupling.drag_exchange import DragTerms, Settings, drag_terms
+from greybed.coupling.exchange_report import ExchangeReport
 from greybed.coupling.forces import added_mass, shear_lift, vorticity_of
 from greybed.coupling.gas import Faces, Gas, begin_with, cell_slopes, imposed_gradient
 from greybed.coupling.gas_heat import GasHeat
+from greybed.coupling.lubrication import lubrication
 from greybed.coupling.transfer import Transfer
 from greybed.coupling.void_fraction import Overlaps, Smoother
 from greybed.dem.simulation import Simulation
@@ -24,46 +25,9 @@ Array = NDArray[np.float64]
 
 # A gas step moves no particle further than this share of a cell.
 _SHARE_OF_CELL = 0.2
-
-
-@dataclass(frozen=True, eq=False)
-class ExchangeReport:
-    """What a gas step has exchanged.
-
-    Attributes
-    ----------
-    time, dt, contact_steps
-        At its end [s], its length [s], steps of the particles in it.
-    given : array, shape (3,)
-        Momentum that drag, lift and added mass have given to the particles [N s].
-    taken, from_rims : array, shape (3,)
-        The same as the gas has lost it inside, and at rim faces, where the boundary holds it.
-    pressure : array, shape (3,)
-        Momentum that the pressure gradient has given to the particles [N s].
-    defect : float
-        Given less taken and from rims, over the largest of the sums of their parts [-].
-    least_void : float
-        Lowest void fraction, before any limit [-].
-    limited : int
-        Cells where the void fraction was raised to the limit.
-    outside : float
-        Share of particles outside the data of the drag law [-].
-    largest_reynolds : float
-        [-].
-    """
-
-    time: float
-    dt: float
-    contact_steps: int
-    given: Array
-    taken: Array
-    from_rims: Array
-    pressure: Array
-    defect: float
-    least_void: float
-    limited: int
-    outside: float
-    largest_reynolds: float
+# Nor two particles by more than this share of the film between them.
+_SHARE_OF_FILM = 0.1
+_NOTHING = np.zeros((0, 3))
 
 
 class GasParticles:
@@ -114,8 +78,8 @@ class GasParticles:
                     f"along {name} the gas repeats from {low:g} to {high:g} and the particles from "
                     f"{box[0, axis]:g} to {box[1, axis]:g} [m]; make them the same."
                 )
-        diameter = 2.0 * float(simulation._state.place[:, 3].mean())
-        self.smoother = Smoother(grid, self.settings.width * diameter)
+        self._diameter = 2.0 * float(simulation._state.place[:, 3].mean())
+        self.smoother = Smoother(grid, self.settings.width * self._diameter)
         self.transfer = Transfer(grid, self.smoother)
         self.time = 0.0
         self.steps = 0
@@ -134,8 +98,11 @@ class GasParticles:
 
         The gas's own limit and that of explicit drag are not in it.
         """
-        speed = np.abs(self.simulation._state.motion[:, :3]).max(axis=0, initial=0.0)
-        rate = float((speed / np.array(self.gas.grid.spacing)).max())
+        # Column by column: numpy is slow across rows of three.
+        rate = max(
+            max(float(v.max()), -float(v.min())) / h
+            for v, h in zip(self.simulation._state.motion.T, self.gas.grid.spacing, strict=False)
+        )
         most = _SHARE_OF_CELL / max(rate, 1e-300) / self.simulation.time_step
         return max(1, int(min(most, 1e9)))
 
@@ -161,6 +128,9 @@ class GasParticles:
             # Half a relaxation time: the force is of the velocity at the start.
             rate = max(self._rate or 0.0, 1e-300) * self.simulation.time_step
             steps = min(steps, int(min(0.5 / rate, 1e9)))
+        if self.settings.lubrication > 0.0:
+            rate = max(self._films(0.0)[1], 1e-300) * self.simulation.time_step
+            steps = min(steps, int(min(_SHARE_OF_FILM / rate, 1e9)))
         return max(1, steps)
 
     def step(self, steps: int | None = None) -> ExchangeReport:
@@ -181,26 +151,24 @@ class GasParticles:
         self.void, least, limited = self._void_of(overlaps)
         # What has moved since the last look took the time of the step before.
         rate = (self.void - before) / (self._passed or dt)
-        mass = sim._state.motion[:, 6]
         seen = self._read(gas.velocity)
         terms = self._terms(overlaps, seen)
         self._note(terms)
         steady = self._steady(overlaps, terms, seen, dt)
         k, target = self._linear(terms, seen, dt)
         place = sim._state.place
-        total, aimed = self.transfer.give(place, k, k * target)
+        total, aimed = self.transfer.give(place, k, target)
         loads: Any = None
         if steady is not None:
             loads, _ = self.transfer.give(place, -steady, np.zeros_like(steady))
         volume = gas.grid.cell_volume
-        none = tuple(np.zeros(s) for s in gas.grid.face_shapes)
+        none: Any = tuple(np.zeros(s) for s in gas.grid.face_shapes)
         if self.settings.treatment == "explicit":
             push = [-(b * u - a) for b, u, a in zip(total, gas.velocity, aimed, strict=True)]
             source: Any = [
                 f if loads is None else f + w for f, w in zip(push, loads or push, strict=True)
             ]
-            drag: Any = none
-            aim: Any = none
+            drag = aim = none
         else:
             source = none if loads is None else loads
             drag = tuple(b / volume for b in total)
@@ -222,23 +190,22 @@ class GasParticles:
             self.heat.take(overlaps, self.smoother, report.heat, order, dt, sim)
         if self.settings.treatment != "explicit":
             at = report.velocity
-        new = self._read(at)
-        force = k * (new - target)
-        given = dt * force.sum(axis=0)
-        parts = dt * np.abs(force).sum(axis=0)
+        pushed, sums = np.empty((len(place), 3)), np.empty((3, 3))
+        by_gas = self.settings.pressure and gas.model == "A"
+        slopes = self._slopes().reshape(-1, 3) if by_gas else _NOTHING
+        _exchange.forces_of(
+            k, self._read(at), target, _NOTHING if steady is None else steady, overlaps.first,
+            overlaps.cell, overlaps.volume, slopes, self._lift(), place, order, pushed, sums,
+        )  # fmt: skip
+        given, parts, by_pressure = dt * sums
         lost = [dt * (b * u - a) for b, u, a in zip(total, at, aimed, strict=True)]
         taken, rims = self.transfer.split(lost)
         if steady is not None:
             given += dt * steady.sum(axis=0)
             inside, outside = self.transfer.split([-f for f in loads])
             taken, rims = taken + dt * inside, rims + dt * outside
-            force = force + steady
-        if self.settings.pressure and gas.model == "A":
-            by_pressure = self._by_pressure(overlaps)
-        else:
-            by_pressure = np.zeros_like(force)
-        pushed = np.empty_like(force)
-        pushed[order] = force + by_pressure + self._buoyancy(mass)
+        if self.settings.lubrication > 0.0:
+            pushed[order] += self._films(dt)[0]
         sim.push(pushed)
         sim.run(count)
         if self.heat is not None:
@@ -248,7 +215,7 @@ class GasParticles:
         self._passed = dt
         scale = float(max(parts.max(initial=0.0), 1e-300))
         return ExchangeReport(
-            self.time, dt, count, given, taken, rims, dt * by_pressure.sum(axis=0),
+            self.time, dt, count, given, taken, rims, by_pressure,
             float(np.abs(given - taken - rims).max()) / scale, least, limited, terms.outside,
             float(terms.reynolds.max(initial=0.0)),
         )  # fmt: skip
@@ -275,8 +242,11 @@ class GasParticles:
 
     def _terms(self, overlaps: Overlaps, seen: Array) -> DragTerms:
         state, fluid = self.simulation._state, self.gas.fluid
-        void = overlaps.mean(self.void[..., None])[:, 0]
-        slip = seen - state.motion[:, :3]
+        slip, void = np.empty_like(seen), np.empty(len(seen))
+        _drag.surroundings(
+            seen, state.motion, overlaps.first, overlaps.cell, overlaps.volume,
+            self.void.reshape(-1), slip, void,
+        )  # fmt: skip
         gradient = None
         if getattr(self.settings.correction, "needs_gradient", False):
             gradient = overlaps.mean(self._slopes())
@@ -293,7 +263,7 @@ class GasParticles:
         secant, slope = terms.coefficient, terms.steepness
         if secant.ndim == 1:
             secant, slope = secant[:, None], slope[:, None]
-        secant = np.broadcast_to(secant, v.shape)
+        v = np.ascontiguousarray(v)
         if self.settings.treatment != "implicit":
             return secant, v if terms.push is None else v - terms.push / secant
         mass = self.simulation._state.motion[:, 6][:, None]
@@ -303,15 +273,17 @@ class GasParticles:
         if terms.push is not None:
             offset = offset - terms.push / steep
         free = np.abs(self.simulation._contact_loads()[:, :3]).max(axis=1) == 0.0
-        fall = self.simulation.gravity + self._buoyancy(mass[:, 0]) / mass
+        fall = self.simulation.gravity + self._buoyancy() / mass
         # A particle that rests on others is not about to fall.
         target = v + offset + np.where(free[:, None], dt * fall, 0.0)
-        return steep / (1.0 + steep * dt / mass), target
+        return np.ascontiguousarray(steep / (1.0 + steep * dt / mass)), target
 
     def _steady(self, overlaps: Overlaps, terms: DragTerms, seen: Array, dt: float) -> Array | None:
         """Forces besides drag that the gas gets back, of the old velocities."""
         settings, state, fluid = self.settings, self.simulation._state, self.gas.fluid
         result = None
+        if settings.lift == "none" and settings.added_mass == 0.0:
+            return None
         slip = seen - state.motion[:, :3]
         d, mass = 2.0 * state.place[:, 3], state.motion[:, 6]
         if settings.lift != "none":
@@ -331,7 +303,7 @@ class GasParticles:
             known = k * slip + mass[:, None] * self.simulation.gravity
             if terms.push is not None:
                 known += terms.push
-            known += self._buoyancy(mass)
+            known += self._buoyancy()
             if settings.pressure and self.gas.model == "A":
                 known += self._by_pressure(overlaps)
             displaced = fluid.density * math.pi / 6.0 * d**3
@@ -342,7 +314,15 @@ class GasParticles:
             result = extra if result is None else result + extra
             kept[labels] = seen
             self._seen = kept
-        return result
+        return None if result is None else np.ascontiguousarray(result)
+
+    def _films(self, dt: float) -> tuple[Array, float]:
+        """Forces of the films between particles, and how fast the fastest one shrinks [1/s]."""
+        d, settings = self._diameter, self.settings
+        return lubrication(
+            self.simulation, self.gas.fluid.viscosity, settings.lubrication * d,
+            settings.roughness * d, dt,
+        )  # fmt: skip
 
     def _by_pressure(self, overlaps: Overlaps) -> Array:
         """Minus the integral of the pressure gradient over each particle, (n, 3) [N]."""
@@ -356,13 +336,20 @@ class GasParticles:
                 slopes[..., c] = self.smoother.cells(slopes[..., c])
         return slopes
 
-    def _buoyancy(self, mass: Array) -> Array:
-        """What the gas's own weight lifts, where its pressure leaves that out, (n, 3) [N]."""
+    def _lift(self) -> Array:
+        """What the gas's own weight lifts, over the cube of the radius, (3,) [N/m3].
+
+        It is 0 where the gas's pressure tells it.
+        """
         told = self.settings.pressure and self.gas.model == "A" and np.any(self.gas.gravity)
         if not self.settings.buoyancy or told:
-            return np.zeros((len(mass), 3))
-        volume = 4.0 / 3.0 * math.pi * self.simulation._state.place[:, 3] ** 3
-        return -self.gas.fluid.density * volume[:, None] * self.simulation.gravity
+            return np.zeros(3)
+        lift: Array = -4.0 / 3.0 * math.pi * self.gas.fluid.density * self.simulation.gravity
+        return lift
+
+    def _buoyancy(self) -> Array:
+        """The same of each particle, (n, 3) [N]."""
+        return self.simulation._state.place[:, 3:] ** 3 * self._lift()
 
     # -- restart ----------------------------------------------------------------------------
 

@@ -45,6 +45,8 @@ class CouplingTable:
     buoyancy: bool = True
     added_mass: float = quantity("dimensionless", 0.0, at_least=0.0, at_most=10.0)  # [-]
     lift: str = choice(tuple(LIFTS), "none")
+    lubrication: float = quantity("dimensionless", 0.0, at_least=0.0, at_most=1.0)  # reach [-]
+    roughness: float = quantity("dimensionless", 1e-3, at_least=1e-6, at_most=0.1)  # [-]
     courant: float = quantity("dimensionless", 0.5, above=0.0, at_most=1.0)  # of the gas [-]
     most_steps: int = whole(1000, at_least=1)  # of the particles in one of the gas [-]
     # Filtered drag: radl-sundaresan, igci, milioli, a .closure file or shipped:NAME.
@@ -61,7 +63,7 @@ class CouplingTable:
         """The settings themselves, but for the correction, which needs the particles."""
         names = (
             "drag", "treatment", "width", "void", "least_void", "mixture", "pressure", "buoyancy",
-            "added_mass", "lift",
+            "added_mass", "lift", "lubrication", "roughness",
         )  # fmt: skip
         return Settings(**{name: getattr(self, name) for name in names})
 

@@ -31,25 +31,33 @@ class Transfer:
             np.array(grid.periodic),
         )  # fmt: skip
 
+        # Where the values of arrays with one layer more come from, along z, y and x.
+        self._from = [
+            [_beyond(grid.cells[a], grid.periodic[a], a == axis) for a in (2, 1, 0)]
+            for axis in range(3)
+        ]
+
     def read(self, velocity: Faces, place: Array) -> Array:
         """Values of faces at particles (n, 4), (n, 3)."""
-        out = np.empty((len(place), 3))
+        out, wide = np.empty((len(place), 3)), []
         for axis, field in enumerate(velocity):
-            values = np.empty(len(place))
+            wide.append(np.empty([len(at) for at in self._from[axis]]))
             smooth = np.ascontiguousarray(self.smoother.faces(field, axis))
-            _exchange.read_faces(place, axis, *self._shape, smooth, values)
-            out[:, axis] = values
+            _exchange.surround(smooth, *self._from[axis], wide[-1])
+        _exchange.read_faces(place, *self._shape, *(a.reshape(-1) for a in wide), out)
         return out
 
-    def give(self, place: Array, first: Array, second: Array) -> tuple[list[Array], list[Array]]:
-        """Two values of each particle, (n, 3) each, summed on faces: the transpose of reading."""
+    def give(self, place: Array, k: Array, target: Array) -> tuple[list[Array], list[Array]]:
+        """Sums of k (n, 3), or (n, 1), and of k target (n, 3) on faces: the transpose of read."""
+        sums = [np.zeros((*(len(at) for at in lists), 2)) for lists in self._from]
+        _exchange.give_to_faces(place, *self._shape, k, target, *(a.reshape(-1) for a in sums))
         one, two = [], []
         for axis, shape in enumerate(self.grid.face_shapes):
             a, b = np.zeros(shape), np.zeros(shape)
-            _exchange.give_to_faces(
-                place, axis, *self._shape, np.ascontiguousarray(first[:, axis]),
-                np.ascontiguousarray(second[:, axis]), a, b,
-            )  # fmt: skip
+            _exchange.gather(sums[axis], *self._from[axis], a, b)
+            if self.grid.periodic[axis]:  # the last face is the first one
+                for ends in (np.moveaxis(a, 2 - axis, 0), np.moveaxis(b, 2 - axis, 0)):
+                    ends[-1] = ends[0]
             one.append(self.smoother.faces(a, axis))
             two.append(self.smoother.faces(b, axis))
         return one, two
@@ -58,9 +66,15 @@ class Transfer:
         """Sums of face values inside, and at rims, (3,) each; faces that repeat count once."""
         inside, rims = np.empty(3), np.zeros(3)
         for axis, field in enumerate(faces):
-            ends = np.moveaxis(field, 2 - axis, 0)
+            sums = field.sum(axis=tuple(a for a in range(3) if a != 2 - axis))
             if self.grid.periodic[axis]:
-                inside[axis] = ends[:-1].sum()
+                inside[axis] = sums[:-1].sum()
             else:
-                inside[axis], rims[axis] = ends[1:-1].sum(), ends[0].sum() + ends[-1].sum()
+                inside[axis], rims[axis] = sums[1:-1].sum(), sums[0] + sums[-1]
         return inside, rims
+
+
+def _beyond(n: int, periodic: bool, faces: bool) -> NDArray[np.int64]:
+    """Numbers along an axis of n cells from one before the first point to one after the last."""
+    points = np.arange(-1, n + 1 + faces)
+    return points % n if periodic else np.clip(points, 0, n - 1 + faces)

@@ -50,9 +50,9 @@ class Overlaps:
             raise InputError(f"method = {method!r} is not known; known are {', '.join(METHODS)}.")
         place = np.ascontiguousarray(place)
         n = len(place)
-        spacing, cells = np.array(grid.spacing), np.array(grid.cells)
-        shape = (np.array(grid.lower, dtype=np.float64), spacing, cells, np.array(grid.periodic))
-        lost = _overlap.outside(place, *shape)
+        shape = (np.array(grid.lower, dtype=np.float64), np.array(grid.spacing),
+                 np.array(grid.cells), np.array(grid.periodic))  # fmt: skip
+        lost, largest = _overlap.survey(place, *shape)
         if lost >= 0:
             at = ", ".join(f"{c:.4g}" for c in place[lost, :3])
             raise InputError(
@@ -61,15 +61,17 @@ class Overlaps:
             )
         self.grid = grid
         self.first = np.empty(n + 1, np.int64)
-        most, entries = _overlap.room(place, spacing)
-        entries = n if method == "centre" else entries
+        # Cells that the largest sphere may reach along each axis.
+        across = [int(2.0 * largest / h) + 2 for h in grid.spacing]
+        most, entries = max(across), n if method == "centre" else n * math.prod(across)
         cell, volume = np.empty(entries, np.int64), np.empty(entries)
         if method == "centre":
             used = _overlap.centre_cells(place, *shape, self.first, cell, volume)
         else:
             used = _overlap.overlaps(place, *shape, most, self.first, cell, volume)
         self.cell, self.volume = cell[:used], volume[:used]
-        self._whole = 4.0 / 3.0 * np.pi * place[:, 3] ** 3
+        r = place[:, 3]
+        self._whole = 4.0 / 3.0 * np.pi * (r * r * r)  # numpy's powers are slow
 
     def solids(self) -> Array:
         """Volumes in the cells, shape (nz, ny, nx) [m3]."""

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from greybed._version import __version__
-from greybed.core.errors import InputError
+from greybed.core.clusters import client_of
 from greybed.core.files import atomic_path, output_folder
 from greybed.core.packing import Packing
 from greybed.core.processes import finished, processes
@@ -44,8 +44,6 @@ RAYS_PER_BLOCK_AND_SPHERE = 10
 MOST_WORKERS = 1024
 # What a block of view factors holds.
 BLOCK_NAMES = ("lengths", "sums", *ENTRY_ARRAYS.values(), *ROW_NAMES)
-# How long a scheduler may take to answer [s].
-PATIENCE = 20.0
 
 
 @dataclass(frozen=True)
@@ -168,8 +166,8 @@ def trace_in_blocks(
     workers : int, optional
         Processes that share the threads; by default none but this one.
     scheduler : str, optional
-        Address of a ``dask.distributed`` scheduler whose workers trace, such as
-        ``tcp://host:8786``; greybed must be installed there.
+        ``local``, the address of a ``dask.distributed`` scheduler whose workers trace, or a TOML
+        file of Slurm jobs: see :func:`greybed.core.clusters.client_of`.
     show_progress : bool
         Draw a progress bar on standard error.
 
@@ -234,7 +232,7 @@ def _tracers(
     """Whoever traces: this process, others beside it, or those of a scheduler."""
     share = max(1, (threads or available_threads()) // max(workers, 1))
     if scheduler is not None:
-        with _client(scheduler) as client:
+        with client_of(scheduler, workers or None) as client:
             there = client.scatter(packing, broadcast=True)
             seats = sum(client.nthreads().values())
             jobs = client.get_executor(pure=False)
@@ -250,32 +248,6 @@ def _tracers(
             yield lambda spans: finished(pool, _held_rows, spans, workers + 1)
     else:
         yield lambda spans: ((span, _rows(packing, (settings, threads), *span)) for span in spans)
-
-
-@contextmanager
-def _client(address: str) -> Iterator[Any]:
-    """A client of the scheduler at ``address``."""
-    try:
-        from distributed import Client
-    except ImportError:
-        raise InputError(
-            "--scheduler needs dask.distributed, which is not installed; pip install "
-            "'greybed[cluster]', or give --workers N to use this machine."
-        ) from None
-    try:
-        client = Client(address, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError, ImportError) as error:
-        raise InputError(
-            f"--scheduler {address}: no scheduler answers there within {PATIENCE:g} [s] "
-            f"({type(error).__name__}); start one with dask scheduler and give the address that "
-            "it prints."
-        ) from None
-    with client:
-        if not client.nthreads():
-            raise InputError(
-                f"--scheduler {address} has no workers; start some with dask worker {address}."
-            )
-        yield client
 
 
 _scene: Scene | None = None

@@ -231,6 +231,18 @@ def advance(
 
 
 @njit(**_OPTIONS)
+def push(forces, torques, ident, before, outer, load):
+    """Fill ``outer`` (n, 6) with pushes in the order of the input, and change the loads by them."""
+    turned, pushed = torques.shape[0] > 0, before.shape[0] > 0
+    for i in range(ident.size):
+        for c in range(3):
+            outer[i, c] = forces[ident[i], c]
+            outer[i, 3 + c] = torques[ident[i], c] if turned else 0.0
+        for c in range(6):
+            load[i, c] += outer[i, c] - before[i, c] if pushed else outer[i, c]
+
+
+@njit(**_OPTIONS)
 def gather(state, near):
     """Add to the loads what waits in ``near.crossing``, and leave nothing there."""
     for i in range(near.into.size - 1):

@@ -253,16 +253,20 @@ class Simulation(Population):
             If they are not finite, or not one for each particle.
         """
         n = len(self._state.place)
-        outer = np.zeros((n, 6))
-        for column, name, values in ((0, "forces", forces), (3, "torques", torques)):
-            if values is None:
-                continue
-            given = np.asarray(values, dtype=np.float64)
-            if given.shape != (n, 3) or not np.isfinite(given).all():
-                raise InputError(f"{name} of shape {given.shape} must be ({n}, 3), all finite.")
-            outer[:, column : column + 3] = given[self._lists.ident]
+        given = {}
+        for name, values in (("forces", forces), ("torques", torques)):
+            given[name] = np.ascontiguousarray(
+                np.zeros((0, 3)) if values is None else values, np.float64
+            )
+            shape = given[name].shape
+            if values is not None and (shape != (n, 3) or not np.isfinite(given[name]).all()):
+                raise InputError(f"{name} of shape {shape} must be ({n}, 3), all finite.")
+        outer = np.empty((n, 6))
         # The next half kick is with the loads of now.
-        self._state.load[:, :6] += outer - self._state.outer if len(self._state.outer) else outer
+        _step.push(
+            given["forces"], given["torques"], self._lists.ident, self._state.outer, outer,
+            self._state.load,
+        )  # fmt: skip
         self._state = self._lists.state = self._state._replace(outer=outer)
 
     # -- inside -----------------------------------------------------------------------------

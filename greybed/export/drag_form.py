@@ -64,7 +64,7 @@ def drag_form(closure: FilteredDragClosure, name: str) -> Form:
         "convention": "fraction kept",
         "with_material": True,
         "n_before": 7,
-        "n_material": 15,
+        "n_material": 18,
         "law": closure.card.get("law", "of none, for it is untrained"),
         "features": [(label, "") for label in chosen.feature_names],
         "gradient": chosen.marked,

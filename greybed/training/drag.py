@@ -53,6 +53,26 @@ def fit(
     return FilteredDragClosure(chosen, predictor, Domain.of(chosen.features(rows.of(chosen))), gate)
 
 
+def flows_of(data: Any) -> NDArray[np.int64]:
+    """A number for each case, the same for cases of one flow, whatever their grids and boxes.
+
+    A closure that has seen a flow on a finer grid or in a wider box has seen it: such cases are
+    held out together.
+    """
+    seen: dict[tuple[object, ...], int] = {}
+    found = [
+        seen.setdefault(
+            (
+                case.source, case.dimension, case.diameter, case.particle_density,
+                case.gas_density, case.gas_viscosity, case.law, case.mean_solid_fraction,
+            ),
+            len(seen),
+        )
+        for case in data.cases
+    ]  # fmt: skip
+    return np.array(found, dtype=np.int64)
+
+
 def folds_of(group: NDArray[np.int64], seed: int, most: int = FOLDS) -> NDArray[np.int64]:
     """A fold (n,) for every row, the same for all rows of a group, groups dealt out at random."""
     names = np.unique(group)
@@ -74,8 +94,8 @@ def train_drag(
     """Train a closure; scores on held-out cases are in its card.
 
     The closure is fitted to all cases. Its scores are those of fits that had not seen the case of
-    a row: cases are dealt into five folds, or as many as there are. The spread is fitted to the
-    errors of these.
+    a row: cases are dealt into five folds, or as many as there are, those of one flow into one.
+    The spread is fitted to the errors of these.
 
     Parameters
     ----------
@@ -120,7 +140,7 @@ def train_drag(
             "run its cases longer or take more filters."
         )
     options: dict[str, Any] = {"seed": seed, "epochs": epochs, "hidden": hidden}
-    by_case = folds_of(rows.case, seed)
+    by_case = folds_of(flows_of(data)[rows.case], seed)
     count = int(by_case.max()) + 1
     by_row = np.random.default_rng(seed + 1).permutation(len(rows)) % count
     total = 1 + count * (2 if random_rows else 1)
@@ -179,11 +199,11 @@ def _check(data: Any, kind: str, markers: str, seed: int, epochs: int) -> None:
             f"the data set counts drag as {convention!r}, and this closure needs {CONVENTION!r}; "
             "convert it (kept = 1 - lost)."
         )
-    cases = len(np.unique(data.case))
+    cases = len(np.unique(flows_of(data)[data.case]))
     if cases < LEAST_CASES:
         raise InputError(
-            f"the data set has {cases} cases, at least {LEAST_CASES} are needed to hold one out "
-            "and still fit; run more cases."
+            f"the data set has {cases} cases of different flows, at least {LEAST_CASES} are needed "
+            "to hold one out and still fit; run more cases."
         )
 
 
@@ -268,7 +288,7 @@ def drag_curve(
     """
     chosen, gate = MARKER_SETS[markers], gate_of(data)
     rows = drag_rows(data).thinned(MOST_ROWS, seed)
-    fold = folds_of(rows.case, seed)
+    fold = folds_of(flows_of(data)[rows.case], seed)
     points = []
     for share in shares:
         held, most = np.zeros_like(rows.force), []

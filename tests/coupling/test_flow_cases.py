@@ -12,6 +12,7 @@ import pytest
 from greybed.cli.main import main
 from greybed.core.config import build, read_toml
 from greybed.core.errors import InputError
+from greybed.core.readers import read_packing
 from greybed.coupling.flow_run import FlowRun
 from greybed.coupling.gas_case import GasCase
 from greybed.coupling.gas_particles_case import GasParticlesCase
@@ -127,6 +128,32 @@ def test_particles_in_a_gas_exchange_momentum_whole_and_go_on_bit_by_bit(tmp_pat
     assert rest.totals == whole.totals
 
 
+def test_the_settled_bed_cools_and_no_heat_is_lost():
+    # Gas, contacts, walls and radiation in one account, at each step; the bed of the quickstart.
+    case = content("cooling_bed", gas_heat={"rays": 64}, output={"samples": "2 ms"})
+    case = build(GasParticlesCase, case | {"duration": "4 ms"}, FLOWS / "cooling_bed.toml")
+    packing = read_packing(FLOWS / case.particles[0].file)
+    run = GasParticlesRun(case, {0: packing}, threads=1)
+    heat, stored = run.coupled.heat, 0.0
+    start = heat.heat.temperatures.copy()
+    flows = np.zeros(4)
+    inner = heat.close
+
+    def close():
+        report = inner()
+        flows[:] += [report.from_gas, report.from_surroundings, report.from_walls, report.exchanged]
+        return report
+
+    heat.close = close
+    for _ in run.go_on():
+        pass
+    assert run.worst["energy"] < 1e-10
+    stored = float(heat.heat.capacities @ (heat.heat.temperatures - start))
+    assert abs(stored - flows[:3].sum()) < 1e-10 * flows[3]
+    # All three take heat from the bed, and each a share that counts.
+    assert flows[:3].max() < -1e-3 * abs(stored)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -134,7 +161,7 @@ def test_particles_in_a_gas_exchange_momentum_whole_and_go_on_bit_by_bit(tmp_pat
         ({"side": [{"name": "z-", "kind": "inflow", "velocity": 1.0}]}, "no side lets it out"),
         ({"coupling": {"drag": "wen-you"}}, "did you mean"),
         ({"coarse_graining": 2.0}, "parcels"),
-        ({"grid": {"cells": [12, 1, 26], "periodic": "x"}}, "must repeat"),
+        ({"grid": {"cells": [12, 1, 26], "periodic": "y"}}, "must repeat"),
         ({"grid": {"upper": ["10 mm", "10 mm", "20 mm"]}}, "densest packing"),
         ({"gas": {"temperature": 300.0}}, "no \\[gas_heat\\]"),
         ({"grid": {"cells": [0, 1, 26]}}, "three whole numbers from 1"),

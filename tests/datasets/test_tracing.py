@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from greybed.cli.main import main
-from greybed.core import InputError, Plane
+from greybed.core import InputError, Plane, clusters
 from greybed.core.sizes import Uniform
 from greybed.core.writers import write_packing
 from greybed.datasets import factors_file, tracing
@@ -68,7 +68,7 @@ def test_a_scheduler_gives_the_bytes_of_one_call(packing, whole, small_blocks, t
 
 def test_a_scheduler_without_workers_or_answer_is_refused(packing, tmp_path, monkeypatch):
     distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
-    monkeypatch.setattr(tracing, "PATIENCE", 0.5)
+    monkeypatch.setattr(clusters, "PATIENCE", 0.5)
     with pytest.raises(InputError, match="no scheduler answers there"):
         trace_in_blocks(packing, tmp_path, Settings(RAYS), scheduler="tcp://127.0.0.1:9")
     with (
@@ -151,7 +151,7 @@ def _alive(pid):
     ],
 )
 def test_refusals(packing, tmp_path, capsys, monkeypatch, words, says):
-    monkeypatch.setattr(tracing, "PATIENCE", 0.5)
+    monkeypatch.setattr(clusters, "PATIENCE", 0.5)
     write_packing(packing, tmp_path / "bed.h5")
     out = ["--rays", "10", "--out", str(tmp_path / "out")]
     assert main(["trace", str(tmp_path / "bed.h5"), *out, *words]) == 2

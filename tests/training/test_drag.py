@@ -201,7 +201,7 @@ def test_more_cases_help_or_do_no_harm(data):
 
 def test_what_cannot_be_trained_is_refused(data):
     few = made_up(cases=2)
-    with pytest.raises(InputError, match="has 2 cases, at least 3 are needed to hold one out"):
+    with pytest.raises(InputError, match="has 2 cases of different flows, at least 3"):
         train_drag(few)
     lost = dataclasses.replace(data, convention="fraction lost")
     with pytest.raises(InputError, match=r"counts drag as 'fraction lost'.*kept = 1 - lost"):
@@ -256,3 +256,15 @@ def test_from_the_command_line(tmp_path, capsys, monkeypatch):
     wrong = ["train", "drag", str(path), "--markers", "pencil", "--out", str(out)]
     assert main(wrong) == 2
     assert "--markers pencil is not for drag" in capsys.readouterr().err
+
+
+def test_twins_of_a_flow_are_held_out_together():
+    from greybed.datasets.filtered_drag import shipped_filtered_drag
+    from greybed.training.drag import flows_of
+
+    data = shipped_filtered_drag()
+    flow = flows_of(data)
+    names = [case.name for case in data.cases]
+    twins = {flow[names.index(name)] for name in ("fcc-15", "fcc-15-fine", "fcc-15-wide")}
+    assert len(twins) == 1
+    assert len(np.unique(flow)) == len(names) - 2

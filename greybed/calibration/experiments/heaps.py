@@ -131,7 +131,8 @@ def flank_angle(profile: Mapping[str, Any]) -> float:
     """Angle of a slope that falls from left to right, of a slice of few grains [degrees].
 
     A straight line through the bins of a tenth to nine tenths of the height, and their neighbours
-    where these are fewer than three; that of greybed.dem takes 20 to 80 % and refuses slopes of so few bins.
+    where these are fewer than three; that of greybed.dem takes 20 to 80 % and refuses slopes of so
+    few bins.
 
     Raises
     ------

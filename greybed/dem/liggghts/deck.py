@@ -51,9 +51,9 @@ class Deck:
     columns: int
     frames: int
 
-    def write(self, folder: Path) -> None:
+    def write(self, folder: Path, deck: str = DECK) -> None:
         """Write deck and files into a folder."""
-        for name, text in {**self.files, DECK: self.text}.items():
+        for name, text in {**self.files, deck: self.text}.items():
             with atomic_path(folder / name) as part:
                 part.write_text(text)
 

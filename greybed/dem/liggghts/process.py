@@ -8,7 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -44,9 +44,11 @@ def command(ranks: int, deck: str, log: str) -> list[str]:
 
 
 @contextmanager
-def started(words: list[str], folder: Path) -> Iterator[subprocess.Popen[str]]:
+def started(
+    words: list[str], folder: Path, more: Mapping[str, str] | None = None
+) -> Iterator[subprocess.Popen[str]]:
     """Run a command in a folder; whatever happens, none of its processes outlives the block."""
-    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", **(more or {})}
     if os.geteuid() == 0:  # in containers; Open MPI asks for both
         environment |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     library = ctypes.CDLL(None) if sys.platform == "linux" else None

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
+from subprocess import Popen
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +17,7 @@ from greybed.core.packing import Packing
 from greybed.core.walls import Plane
 from greybed.dem.case import ParticleCase
 from greybed.dem.clump import Clump
-from greybed.dem.liggghts.deck import DECK, LOG, TOLD, deck_of
+from greybed.dem.liggghts.deck import DECK, LOG, TOLD, Deck, deck_of
 from greybed.dem.liggghts.dump import Snapshot, read_dump
 from greybed.dem.liggghts.limits import check
 from greybed.dem.liggghts.process import command, started
@@ -54,18 +56,20 @@ class LiggghtsRun:
     """
 
     heat = None
+    engine, deck_name, log_name, version_head = "LIGGGHTS", DECK, LOG, "LIGGGHTS ("
+    dumps = ".bin"
 
     def __init__(
         self, case: ParticleCase, packings: dict[int, Packing], folder: Path, *, ranks: int = 1
     ) -> None:
-        self.words = command(ranks, DECK, LOG)
-        check(case)
+        self.words = self._words(ranks)
+        self._check(case)
         # Our own engine finds places and time step, and refuses what neither of both can run.
         start = ParticleRun(case, packings)
         self.case, self.tally, self.steps = start.case, start.tally, start.steps
         self.shapes: dict[str, Clump] = {}
         self.look, self.ranks, self.folder = start.look, ranks, folder
-        self.deck = deck_of(start)
+        self.deck = self._deck(start)
         self._sample = start._sample
         sim = start.simulation
         self._at_start = len(sim.radii)
@@ -100,12 +104,12 @@ class LiggghtsRun:
             bounds.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
-        for old in self.folder.glob("*.bin"):
+        for old in self.folder.glob(f"*{self.dumps}"):
             old.unlink()
-        self.deck.write(self.folder)
+        self.deck.write(self.folder, self.deck_name)
         wanted = self._wanted()
         told, done, said, last = 0, 0, "", ""
-        with started(self.words, self.folder) as child:
+        with self._started() as child:
             assert child.stdout is not None
             for line in child.stdout:
                 step, whole = self._heard(line)
@@ -113,8 +117,8 @@ class LiggghtsRun:
                     said = line.strip()
                 elif line.strip() and step < 0:
                     last = line.strip()
-                if line.startswith("LIGGGHTS (") and not self.version:
-                    self.version = line.strip().removeprefix("LIGGGHTS (").rstrip(")")
+                if line.startswith(self.version_head) and not self.version:
+                    self.version = line.strip().removeprefix(self.version_head).rstrip(")")
                 if step > told and on_progress is not None:
                     on_progress(min(step, self.steps) - told)
                     told = min(step, self.steps)
@@ -128,10 +132,27 @@ class LiggghtsRun:
             code = child.wait()
         if code and not self._is_empty():
             raise InputError(
-                f"LIGGGHTS stopped with exit code {code}: {said or last or 'it said nothing'}; "
-                f"its log is {self.folder / LOG}."
+                f"{self.engine} stopped with exit code {code}: "
+                f"{said or last or 'it said nothing'}; its log is {self.folder / self.log_name}."
             )
         yield from self._end(done)
+
+    # -- what differs between engines -------------------------------------------------------
+
+    def _words(self, ranks: int) -> list[str]:
+        return command(ranks, DECK, LOG)
+
+    def _check(self, case: ParticleCase) -> None:
+        check(case)
+
+    def _deck(self, start: ParticleRun) -> Deck:
+        return deck_of(start)
+
+    def _started(self) -> AbstractContextManager[Popen[str]]:
+        return started(self.words, self.folder)
+
+    def _read(self, path: Path) -> Array:
+        return read_dump(path)[1]
 
     # -- what is heard ----------------------------------------------------------------------
 
@@ -187,11 +208,11 @@ class LiggghtsRun:
 
     def _take(self, step: int) -> bool:
         """Read the state of a step; false where there are no particles."""
-        paths = [self.folder / f"{name}.{step}.bin" for name in ("sample", "frame")]
+        paths = [self.folder / f"{name}.{step}{self.dumps}" for name in ("sample", "frame")]
         there = [path for path in paths if path.exists()]
         if not there:
             return False
-        rows = read_dump(there[0])[1]
+        rows = self._read(there[0])
         for path in there:
             path.unlink()
         return self._show(step, rows, note=step % self._sample == 0)
@@ -214,9 +235,9 @@ class LiggghtsRun:
 
     def _end(self, done: int) -> Iterator[int]:
         """The last state, and what came in all the time."""
-        path = self.folder / f"last.{self.steps}.bin"
+        path = self.folder / f"last.{self.steps}{self.dumps}"
         if path.exists():
-            rows = read_dump(path)[1]
+            rows = self._read(path)
             path.unlink()
             self._show(self.steps, rows, note=self.steps % self._sample != 0)
         else:

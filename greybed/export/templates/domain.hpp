@@ -19,13 +19,14 @@ GREYBED_DEVICE inline double distance2(const double* features, double* away, dou
 
 /// Whether features lie outside the training data.
 GREYBED_DEVICE inline bool outside(const double* features) {
-  bool box = false;
+  int box = 0;  // without branches
   for (int i = 0; i < N_FEATURES; ++i) {
-    box = box || features[i] < domain_low()[i] || features[i] > domain_high()[i];
+    box |= static_cast<int>(features[i] < domain_low()[i]);
+    box |= static_cast<int>(features[i] > domain_high()[i]);
   }
   double away[N_FEATURES];
   double across[N_COLUMNS];
-  return distance2(features, away, across) > {{ limit2 }} || box;
+  return distance2(features, away, across) > {{ limit2 }} || box != 0;
 }
 
 /// A place inside the training data: held at the box, then drawn towards the centre.

@@ -52,12 +52,12 @@ GREYBED_HOT double bend(double x, double bound, double* slope) {
 }
 
 {% if gradient %}
-/// Logarithm of a smooth positive part.
-GREYBED_HOT double log_positive(double q, double* slope) {
+/// A smooth positive part, and the slope of its logarithm.
+GREYBED_HOT double positive(double q, double* slope) {
   const double root = std::sqrt(q * q + {{ small.ratio }} * {{ small.ratio }});
   const double size = root + (q < 0.0 ? -q : q);
   *slope = 1.0 / root;
-  return std::log(q >= 0.0 ? 0.5 * size : 0.5 * {{ small.ratio }} * {{ small.ratio }} / size);
+  return q >= 0.0 ? 0.5 * size : 0.5 * {{ small.ratio }} * {{ small.ratio }} / size;
 }
 
 {% endif %}
@@ -66,12 +66,14 @@ GREYBED_DEVICE inline void features_of(const double* m, double log_reynolds, Fea
   const double up = m[3];
   const double across2 = m[4] * m[4];
   f->value[0] = phi;
-  f->value[1] = std::log(phi + {{ small.dilute }});
-  f->value[2] = std::log(m[1] + {{ small.filter }});
   f->value[3] = log_reynolds;
   f->value[4] = bend(up, {{ small.slip_bend }}, &f->bent_up);
-  f->value[5] = std::log(across2 + {{ small.across }});
   f->log_across = 1.0 / (across2 + {{ small.across }});
+  double three[4];
+  store(log_lanes(four(phi + {{ small.dilute }}, m[1] + {{ small.filter }}, across2 + {{ small.across }}, 1.0)), three);
+  f->value[1] = three[0];
+  f->value[2] = three[1];
+  f->value[5] = three[2];
 {% if gradient %}
   const double inverse_scale = 1.0 / ((phi + {{ small.fraction }}) * m[7]);
   const double inverse_ratio = (phi + {{ small.fraction }}) * inverse_scale;
@@ -83,8 +85,10 @@ GREYBED_DEVICE inline void features_of(const double* m, double log_reynolds, Fea
   const double q_across = m[6] * of_work;
   double slope_up;
   double slope_across;
-  f->value[6] = log_positive(q_up, &slope_up);
-  f->value[7] = log_positive(q_across, &slope_across);
+  double two[4];
+  store(log_lanes(four(positive(q_up, &slope_up), positive(q_across, &slope_across), 1.0, 1.0)), two);
+  f->value[6] = two[0];
+  f->value[7] = two[1];
   f->value[8] = bend(m[5], {{ small.gradient_bend }}, &f->bent_pull);
   f->up_of_pull = slope_up * of_pull;
   f->up_of_slip = slope_up * m[5] * ({{ small.slip2 }} - up * up) * (inverse_scale * up2 * up2);
@@ -163,12 +167,10 @@ GREYBED_DEVICE inline void slopes_of_markers(const double* m, const Features& f,
 {% endif %}
 /// Kept fractions of markers in their ranges; inside the training data where inner is not null.
 template <int WANTED>
-GREYBED_DEVICE inline void kept(const double* m, const Features& f, const Inner* inner, Kept* out) {
+GREYBED_DEVICE inline void kept(const double* m, const Features& f, double g, const Inner* inner,
+                                Kept* out) {
   const double* const seen = inner == nullptr ? f.value : inner->features;
-  double gate_of_fraction = 0.0;
-  double gate_of_size = 0.0;
   const bool all = WANTED == OF_MARKERS;
-  const double g = gate(m[0], m[1], all ? &gate_of_fraction : nullptr, &gate_of_size);
   const double parcels = {{ parcel_rate }} * (m[N_MARKERS - 1] - 1.0);
   double raw[N_RAW];
 {% if kind == "mlp" %}
@@ -180,26 +182,38 @@ GREYBED_DEVICE inline void kept(const double* m, const Features& f, const Inner*
   } else {
     network<(WANTED == SPREAD ? N_RAW : N_VALUES), 0, 0>(seen, raw, nullptr);
   }
-  double slope[3];
-  const double log_along = bend(raw[0], {{ log_bound }}, slope);
-  const double log_across = bend(raw[1], {{ log_bound }}, slope + 1);
+  double slope[4];
+  double logs[4];
+  v4 bent = four(raw[0] / {{ log_bound }}, raw[1] / {{ log_bound }}, 0.0, 0.0);
+  v4 bent_slope;
+  Bent::squash(bent, bent_slope);
+  store(bent * four({{ log_bound }}), logs);
+  store(bent_slope, slope);
+  const double log_along = logs[0];
+  const double log_across = logs[1];
 {% else %}
   // Constant between the cuts of a forest.
   forest(seen, raw);
   const double log_along = raw[0];
   const double log_across = raw[1];
 {% endif %}
+  double powers[4];
 {% if linear %}
-  const double part = logistic(raw[2]);
+  const double away = raw[2] < 0.0 ? raw[2] : -raw[2];
+  store(exp_lanes(larger(four(g * (log_along - parcels), g * (log_across - parcels), away, 0.0),
+                         four(-700.0))), powers);
+  const double part = (raw[2] < 0.0 ? powers[2] : 1.0) / (1.0 + powers[2]);
 {% if kind == "mlp" %}
   slope[2] = {{ share_bound }} * part * (1.0 - part);
 {% endif %}
   const double share = {{ share_bound }} * part;
 {% else %}
+  store(exp_lanes(larger(four(g * (log_along - parcels), g * (log_across - parcels), 0.0, 0.0),
+                         four(-700.0))), powers);
   const double share = 0.0;
 {% endif %}
-  out->along = std::exp(g * (log_along - parcels));
-  out->across = std::exp(g * (log_across - parcels));
+  out->along = powers[0];
+  out->across = powers[1];
   out->share = g * share;
   out->stderr_ = 0.0;
   if (WANTED == SPREAD) {
@@ -226,6 +240,9 @@ GREYBED_DEVICE inline void kept(const double* m, const Features& f, const Inner*
 {% endif %}
   }
   if (all) {
+    double gate_of_fraction;
+    double gate_of_size;
+    gate(m[0], m[1], &gate_of_fraction, &gate_of_size);
     const double value[3] = {log_along - parcels, log_across - parcels, share};
     const double outer[3] = {out->along, out->across, 1.0};
     for (int k = 0; k < 3; ++k) {
@@ -255,8 +272,9 @@ GREYBED_DEVICE inline void freely(const double* m, Kept* out) {
   }
   Features f;
   features_of(m, std::log(m[2]), &f);
-  kept<WANTED>(m, f, nullptr, out);
-  out->extrapolates = WANTED == SPREAD && gate(m[0], m[1], nullptr, nullptr) > 0.0 && outside(f.value);
+  const double g = gate(m[0], m[1], nullptr, nullptr);
+  kept<WANTED>(m, f, g, nullptr, out);
+  out->extrapolates = WANTED == SPREAD && g > 0.0 && outside(f.value);
 }
 
 /// Kept fractions under a guard; log_reynolds is that of marker 2.
@@ -275,9 +293,10 @@ GREYBED_DEVICE inline Status guarded(const double* given, double log_reynolds, G
   }
   Features f;
   features_of(m, held[2] ? std::log(m[2]) : log_reynolds, &f);
-  const bool away = gate(m[0], m[1], nullptr, nullptr) > 0.0 && outside(f.value);
+  const double g = gate(m[0], m[1], nullptr, nullptr);
+  const bool away = g > 0.0 && outside(f.value);
   if (legal == 0 && !away) {
-    kept<WANTED>(m, f, nullptr, out);
+    kept<WANTED>(m, f, g, nullptr, out);
     return Status::inside;
   }
   ++guard.outside;
@@ -290,11 +309,11 @@ GREYBED_DEVICE inline Status guarded(const double* given, double log_reynolds, G
     return Status::baseline;
   }
   if (guard.policy == Policy::extrapolate) {
-    kept<WANTED>(m, f, nullptr, out);
+    kept<WANTED>(m, f, g, nullptr, out);
     return Status::extrapolated;
   }
   const Inner inner(f.value);
-  kept<WANTED>(m, f, &inner, out);
+  kept<WANTED>(m, f, g, &inner, out);
   return Status::clamped;
 }
 

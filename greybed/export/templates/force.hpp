@@ -14,6 +14,9 @@ struct GREYBED_TYPE Material {
   double reynolds_s_m;          ///< rho_g d / mu
   double stokes_kg_m3_s;        ///< 18 mu / d^2
   double inverse_velocity_s_m;  ///< 1 / u_t
+  double inverse_weight_m3_n;   ///< 1 / weight
+  double inverse_length_1_m;    ///< 1 / L_c
+  double inverse_drag;          ///< 1 / terminal_drag [-]
 };
 
 /// F of Schiller & Naumann times (1 - phi)^-3.65 (Wen & Yu), and Re dF/dRe in slope.
@@ -59,6 +62,9 @@ GREYBED_DEVICE inline Material material(double diameter_m, double particle_densi
   m.length_m = diameter_m * std::cbrt(m.terminal_velocity_m_s * m.terminal_velocity_m_s /
                                       (g * diameter_m));
   m.inverse_velocity_s_m = 1.0 / m.terminal_velocity_m_s;
+  m.inverse_weight_m3_n = 1.0 / m.weight_n_m3;
+  m.inverse_length_1_m = 1.0 / m.length_m;
+  m.inverse_drag = 1.0 / m.terminal_drag;
   return m;
 }
 
@@ -112,7 +118,7 @@ GREYBED_DEVICE inline Status force_of(const Material& m, const Inputs& in, const
 {% endif %}
 {% if gradient %}
   const double fall_up = fall[0] * m.up[0] + fall[1] * m.up[1] + fall[2] * m.up[2];
-  const double of_fall = m.inverse_velocity_s_m / m.weight_n_m3;
+  const double of_fall = m.inverse_velocity_s_m * m.inverse_weight_m3_n;
   double fall_across[3];
   double work = 0.0;
   for (int i = 0; i < 3; ++i) {
@@ -120,12 +126,12 @@ GREYBED_DEVICE inline Status force_of(const Material& m, const Inputs& in, const
     work += fall[i] * lateral[i];
   }
 {% endif %}
-  const double ratio = law.factor / m.terminal_drag;
+  const double ratio = law.factor * m.inverse_drag;
   const double marker[N_MARKERS] = {
-      phi, in.filter_size_m / m.length_m, m.terminal_reynolds, s_up * m.inverse_velocity_s_m,
+      phi, in.filter_size_m * m.inverse_length_1_m, m.terminal_reynolds, s_up * m.inverse_velocity_s_m,
       std::sqrt(across2) * m.inverse_velocity_s_m,
 {% if gradient %}
-      fall_up / m.weight_n_m3, work * of_fall, ratio,
+      fall_up * m.inverse_weight_m3_n, work * of_fall, ratio,
 {% endif %}
       in.parcels};
   const double beta = m.stokes_kg_m3_s * (1.0 - phi) * phi * law.factor;

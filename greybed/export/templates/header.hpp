@@ -62,7 +62,7 @@ using namespace greybed::shared1;
 
 {% for table in tables %}
 GREYBED_DEVICE inline const {{ table.ctype }}* {{ table.name }}() {
-  static const {{ table.ctype }} data[{{ table.size }}] = {
+  static const {{ table.ctype }} data[{{ table.room }}] = {
       {{ table.text }}};
   return data;
 }
@@ -70,7 +70,7 @@ GREYBED_DEVICE inline const {{ table.ctype }}* {{ table.name }}() {
 {% endfor %}
 {% for table in golden %}
 inline const {{ table.ctype }}* {{ table.name }}() {
-  static const {{ table.ctype }} data[{{ table.size }}] = {
+  static const {{ table.ctype }} data[{{ table.room }}] = {
       {{ table.text }}};
   return data;
 }

@@ -43,11 +43,13 @@ struct Sums {
   /// Through the bend of a layer, to memory; slopes too unless there is no place for them.
   template <class Bend, bool SLOPES>
   GREYBED_HOT void squash(double* value, double* slope) {
-    v4 s;
-    Bend::squash(head, s);
-    store(head, value);
+    // Two blocks side by side: neither waits for the other.
+    Two<v4> x = {head, rest.head};
+    Two<v4> s;
+    Bend::squash(x, s);
+    store(x, value);
     if (SLOPES) store(s, slope);
-    rest.template squash<Bend, SLOPES>(value + 4, SLOPES ? slope + 4 : slope);
+    rest.rest.template squash<Bend, SLOPES>(value + 8, SLOPES ? slope + 8 : slope);
   }
   /// Dot product with p.
   GREYBED_HOT v4 dot(const double* p) const {
@@ -69,7 +71,42 @@ struct Sums<0> {
   GREYBED_HOT void squash(double*, double*) {}
   GREYBED_HOT v4 dot(const double*) const { return four(0.0); }
 };
+/// One block: the end of a row of an odd number of blocks.
+template <>
+struct Sums<1> {
+  v4 head;
+  Sums<0> rest;
 
+  GREYBED_HOT void set(double x) { spread(x, head); }
+  GREYBED_HOT void get(const double* p) { load(p, head); }
+  GREYBED_HOT void put(double* p) const { store(head, p); }
+  GREYBED_HOT void add(const double* p, const v4& x) {
+    v4 w;
+    load(p, w);
+    add_product(head, w, x);
+  }
+  GREYBED_HOT void scale_by(const double* p) {
+    v4 w;
+    load(p, w);
+    head = head * w;
+  }
+  GREYBED_HOT void mix(const Sums& x, const v4& s, const Sums& y, const v4& t) {
+    head = x.head * s + y.head * t;
+  }
+  GREYBED_HOT void scaled(const Sums& x, const v4& s) { head = x.head * s; }
+  template <class Bend, bool SLOPES>
+  GREYBED_HOT void squash(double* value, double* slope) {
+    v4 s;
+    Bend::squash(head, s);
+    store(head, value);
+    if (SLOPES) store(s, slope);
+  }
+  GREYBED_HOT v4 dot(const double* p) const {
+    v4 w;
+    load(p, w);
+    return head * w;
+  }
+};
 // Sums of this many blocks at once fit the registers.
 #if defined(__AVX__) || defined(GREYBED_AVX2)
 constexpr int TOGETHER = 8;

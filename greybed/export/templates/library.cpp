@@ -149,6 +149,7 @@ const {{ name }}_library library = {
 #undef greybed
 #undef GREYBED_AVX2
 #undef GREYBED_VECTORS
+#undef GREYBED_WIDE
 #undef GREYBED_SHARED_1
 #undef {{ guard }}
 #endif  // GREYBED_DISPATCH

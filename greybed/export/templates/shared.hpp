@@ -129,6 +129,8 @@ GREYBED_DEVICE inline double logistic(double x) {
 
 {% include "lanes.hpp" %}
 
+{% include "bends.hpp" %}
+
 {% include "layers.hpp" %}
 
 {% include "dual.hpp" %}

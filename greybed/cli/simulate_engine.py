@@ -1,4 +1,4 @@
-"""``greybed simulate --engine liggghts``: the same case and the same results, moved by LIGGGHTS."""
+"""``greybed simulate --engine liggghts|lammps``: the same case and results, moved by them."""
 
 from __future__ import annotations
 
@@ -19,10 +19,8 @@ from greybed.cli.simulate_particles import (
     write_results,
 )
 
-WORK = "liggghts"
 
-
-def run_liggghts(options: argparse.Namespace) -> int:
+def run_engine(options: argparse.Namespace) -> int:
     """Run the case that ``options`` names; returns 0."""
     from greybed.core.errors import InputError
     from greybed.core.files import output_folder, sole_writer
@@ -30,11 +28,14 @@ def run_liggghts(options: argparse.Namespace) -> int:
     from greybed.core.readers import read_packing
     from greybed.core.writers.history import write_history
     from greybed.dem.case import load_particle_case
-    from greybed.dem.liggghts.deck import LOG
     from greybed.dem.liggghts.run import LiggghtsRun, loops
 
     if options.threads is not None:
         raise InputError("--threads is for --engine greybed only; take --ranks, or leave it out.")
+    if options.fix and options.plugin is None:
+        raise InputError("--fix needs the plugin that has it; give --plugin FILE, or leave it out.")
+    if (options.plugin or options.fix) and options.engine != "lammps":
+        raise InputError("--plugin and --fix are for --engine lammps only; leave them out.")
     case = load_particle_case(options.case)
     files, inputs = files_of(case, options.case)
     folder = output_folder(options.out)
@@ -42,7 +43,17 @@ def run_liggghts(options: argparse.Namespace) -> int:
     with sole_writer(folder / ".simulate.lock"), _ended_by_signal():
         packings = {k: read_packing(path) for k, path in files.items()}
         try:
-            run = LiggghtsRun(case, packings, folder / WORK, ranks=ranks)
+            work = folder / options.engine
+            run: LiggghtsRun
+            if options.engine == "lammps":
+                from greybed.dem.lammps import LammpsRun
+
+                run = LammpsRun(
+                    case, packings, work, ranks=ranks, plugin=options.plugin,
+                    fixes=tuple(options.fix),
+                )  # fmt: skip
+            else:
+                run = LiggghtsRun(case, packings, work, ranks=ranks)
             # A checkpoint of our own engine in this folder is of other results.
             (folder / CHECKPOINT).unlink(missing_ok=True)
             frames = Frames(run, folder, options.movie)
@@ -59,7 +70,7 @@ def run_liggghts(options: argparse.Namespace) -> int:
         except InputError as error:
             raise InputError(f"{options.case}: {error}") from None
         seconds = time.perf_counter() - begin
-        results = _results(run, moved, seconds, loops(folder / WORK / LOG))
+        results = _results(run, moved, seconds, loops(work / run.log_name))
         summary = write_results(folder, run, frames, results, inputs)
     say(results, folder)
     print(f"wrote {summary}")
@@ -71,7 +82,7 @@ def _results(run: Any, moved: int, seconds: float, in_loops: float) -> dict[str,
 
     return {
         **results_of(run),
-        "engine": "liggghts",
+        "engine": run.engine.lower(),
         "engine_version": run.version,
         "ranks": run.ranks,
         "seconds": seconds,
@@ -82,7 +93,7 @@ def _results(run: Any, moved: int, seconds: float, in_loops: float) -> dict[str,
 
 @contextmanager
 def _ended_by_signal() -> Iterator[None]:
-    """Let SIGTERM end us in order, so that LIGGGHTS does not stay behind."""
+    """Let SIGTERM end us in order, so that the engine does not stay behind."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
