@@ -17,11 +17,9 @@ import numpy as np
 
 from greybed.calibration.experiment import COST, Experiment, RunFailed
 from greybed.calibration.store import Outcome, Store, run_key
-from greybed.core.errors import InputError
+from greybed.core.clusters import client_of
 from greybed.core.processes import finished, processes
 
-# How long a scheduler may take to answer [s].
-PATIENCE = 20.0
 _LONGEST = 300  # characters of a reason
 
 
@@ -109,7 +107,7 @@ class Campaign:
 
     def __enter__(self) -> Campaign:
         if self.scheduler is not None:
-            client = self._stack.enter_context(_client(self.scheduler))
+            client = self._stack.enter_context(client_of(self.scheduler, self.workers or None))
             self._pool = client.get_executor(pure=False)
         elif self.workers > 0:
             self._pool = self._stack.enter_context(processes(self.workers))
@@ -182,25 +180,6 @@ class Campaign:
 
 def _placed(place: int, experiment: Experiment, values: Mapping[str, float], seed: int) -> Any:
     return attempt_run(experiment, values, seed)
-
-
-def _client(address: str) -> Any:
-    """A client of the scheduler at ``address``."""
-    try:
-        from distributed import Client
-    except ImportError:
-        raise InputError(
-            "scheduler needs dask.distributed, which is not installed; pip install "
-            "'greybed[cluster]', or give workers to use this machine."
-        ) from None
-    try:
-        return Client(address, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError, ImportError) as error:
-        raise InputError(
-            f"scheduler = {address!r}: no scheduler answers there within {PATIENCE:g} [s] "
-            f"({type(error).__name__}); start one with dask scheduler and give the address that "
-            "it prints."
-        ) from None
 
 
 def cost_of(outcome: Outcome) -> float:

@@ -107,7 +107,7 @@ class Options:
     workers : int
         Processes; 0 runs in this one [-].
     scheduler : str or None
-        Address of a ``dask.distributed`` scheduler.
+        As of :func:`greybed.core.clusters.client_of`: an address, ``local``, a file of Slurm jobs.
     attempts : int
         Seeds that are tried where a run fails [-].
     cost_weight : float

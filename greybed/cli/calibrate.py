@@ -20,7 +20,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder for the results")
     parser.add_argument("--workers", type=int, help="processes (default: as the study says)")
     parser.add_argument(
-        "--scheduler", help="address of a dask.distributed scheduler, such as tcp://host:8786"
+        "--scheduler",
+        help="dask: local, an address such as tcp://host:8786, or a TOML file of Slurm jobs",
     )
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
 

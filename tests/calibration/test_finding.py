@@ -152,6 +152,16 @@ def test_workers_change_nothing(make_study, tmp_path):
     assert plain(alone) == plain(others)
 
 
+def test_a_scheduler_changes_nothing(make_study):
+    distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
+    alone = calibrate(make_study(runs=8, batch=2))
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
+    ) as cluster:
+        there = calibrate(make_study(runs=8, batch=2, scheduler=cluster.scheduler_address))
+    assert plain(there) == plain(alone)
+
+
 class NarrowTwin(DrawDownTwin):
     """Crashes wherever the rolling friction is high."""
 
