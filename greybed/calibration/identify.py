@@ -117,8 +117,16 @@ def information(model: Metamodel, u: Array) -> Array:
 
 
 def directions(model: Metamodel, u: Array) -> list[Direction]:
-    """Directions at a point, the best determined one first."""
-    values, vectors = np.linalg.eigh(information(model, u))
+    """Directions at a point, the best determined one first.
+
+    Those that are open span a space in which any basis is as good: the one is taken that needs the
+    fewest parameters for each (varimax: Kaiser, Psychometrika 23 (1958) 187).
+    """
+    matrix = information(model, u)
+    values, vectors = np.linalg.eigh(matrix)
+    left = 1.0 / (1.0 + np.maximum(values, 0.0)) > DETERMINED
+    vectors[:, left] = _varimax(vectors[:, left])
+    values = np.einsum("ij,ik,kj->j", vectors, matrix, vectors)
     found = []
     for k in np.argsort(-values, kind="stable"):
         size = max(float(values[k]), 0.0)
@@ -127,6 +135,24 @@ def directions(model: Metamodel, u: Array) -> list[Direction]:
             Direction(size, 1.0 / (1.0 + size), weights, in_words(weights, model.space.names))
         )
     return found
+
+
+def _varimax(basis: Array) -> Array:
+    """An orthonormal basis (d, m) turned so that its squared entries are as unequal as can be."""
+    m = basis.shape[1]
+    if m < 2:
+        return basis
+    turned, before = basis, 0.0
+    rotation = np.eye(m)
+    for _ in range(200):
+        turned = basis @ rotation
+        slope = basis.T @ (turned**3 - turned * (turned**2).mean(axis=0))
+        u, s, v = np.linalg.svd(slope)
+        rotation = u @ v
+        if s.sum() < before * (1.0 + 1e-10):
+            break
+        before = float(s.sum())
+    return np.asarray(basis @ rotation)
 
 
 def in_words(weights: Array, names: Sequence[str]) -> str:

@@ -148,6 +148,8 @@ class Campaign:
                 if kept is not None:
                     tried[k].append(kept)
                     self.found += 1
+                    if kept.results is not None or attempt + 1 == self.attempts:
+                        self.tell(1)
                     continue
                 todo.append((k, key, experiment, values, seed))
             for place, answer in self._results(todo):

@@ -233,14 +233,15 @@ class Study:
 
     def _check_options(self) -> None:
         o = self.options
-        least = len(self.space) + 2
+        points = len(self.space) + 2
+        least = points * len(self.with_role("calibration")) * o.replicates
         if o.strategy != "screening" and o.runs < least:
             raise InputError(
-                f"runs = {o.runs} [-] must be at least {least}, two more than there are free "
-                "parameters."
+                f"runs = {o.runs} [-] must be at least {least}: two points more than there are free "
+                "parameters, for each replicate and experiment that is fitted to."
             )
-        if o.initial and not least <= o.initial:
-            raise InputError(f"initial = {o.initial} [-] must be at least {least}, or 0.")
+        if o.initial and not points <= o.initial:
+            raise InputError(f"initial = {o.initial} [-] must be at least {points}, or 0.")
         if not math.isfinite(o.cost_weight) or o.cost_weight < 0.0:
             raise InputError(f"cost_weight = {o.cost_weight:g} [-] must be at least 0.")
 

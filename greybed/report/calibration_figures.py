@@ -113,7 +113,7 @@ def posterior_figure(study: Study, found: Answer) -> Markup:
         axes.set_ylim(-0.15, n)
         axes.grid(visible=False)
         axes.spines["left"].set_visible(False)
-        axes.set_xlabel("from the low to the high end of the range")
+        axes.set_xlabel("share of the range")
         return to_svg(figure, "posterior of every parameter")
 
 

@@ -82,6 +82,8 @@ def test_directions_of_a_linear_measure(linear):
     np.testing.assert_allclose(np.abs(found[0].weights[:2]), np.sqrt(0.5), atol=0.01)
     assert found[0].determined
     assert [d.determined for d in found[1:]] == [False, False]
+    # The open ones in as few parameters as possible: a - b, and c alone.
+    assert {d.words for d in found[1:]} <= {"a − b", "b − a", "c"}
     assert effective_number(found) == pytest.approx(1.0, abs=0.01)
 
 
