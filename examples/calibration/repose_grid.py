@@ -2,8 +2,8 @@
 
     python examples/calibration/repose_grid.py [--seeds N] [--count N]
 
-Nine pairs of mu (0.5, 0.7, 0.9) and mu_r (0.07, 0.14, 0.21), a lifted cylinder of 400 grains instead
-of a heap of some ten thousand; prints the angle and the height of the heap with their errors.
+Nine pairs of mu (0.5, 0.7, 0.9) and mu_r (0.07, 0.14, 0.21), a lifted cylinder of 400 grains
+instead of a large heap; prints the angle and the height of the heap with their errors.
 """
 
 import argparse
@@ -28,7 +28,7 @@ for friction in (0.5, 0.7, 0.9):
         height = 1e3 * np.array([run["height"] for run in runs])
         root = np.sqrt(len(runs))
         print(
-            f"{friction:.2f}  {rolling:.2f}  {angle.mean():5.1f} +- {angle.std(ddof=1) / root:3.1f}  "
+            f"{friction:.2f}  {rolling:.2f}  {angle.mean():5.1f} +- {angle.std(ddof=1) / root:.1f} "
             f"{height.mean():6.2f} +- {height.std(ddof=1) / root:.2f}",
             flush=True,
         )

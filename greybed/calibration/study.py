@@ -237,8 +237,8 @@ class Study:
         least = points * len(self.with_role("calibration")) * o.replicates
         if o.strategy != "screening" and o.runs < least:
             raise InputError(
-                f"runs = {o.runs} [-] must be at least {least}: two points more than there are free "
-                "parameters, for each replicate and experiment that is fitted to."
+                f"runs = {o.runs} [-] must be at least {least}: two points more than there are "
+                "free parameters, for each replicate and experiment that is fitted to."
             )
         if o.initial and not points <= o.initial:
             raise InputError(f"initial = {o.initial} [-] must be at least {points}, or 0.")
