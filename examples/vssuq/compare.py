@@ -114,8 +114,8 @@ def main() -> None:
         scatter = p.std(ddof=1) if len(p) > 1 else 0.0
         error = float(np.hypot(scatter, by_velocity))
         half = student.ppf(0.975, len(m) - 1) * m.std(ddof=1) / np.sqrt(len(m))
-        print(f"condition {key[0]}, order {key[1]}: measured {m.mean():.2f} +- {half:.2f} s (95 %), "
-              f"sd {m.std(ddof=1):.2f}; found {p.mean():.2f} s, sd of {len(p)} seeds {scatter:.2f}, "
+        print(f"condition {key[0]}, order {key[1]}: measured {m.mean():.2f} +- {half:.2f} s, sd "
+              f"{m.std(ddof=1):.2f}; found {p.mean():.2f} s, sd of {len(p)} seeds {scatter:.2f}, "
               f"by u(U) {by_velocity:.2f}")  # fmt: skip
         label = (f"{float(mine['U [m/s]']):.2f} m/s, {mine['intruders [-]']} {mine['size']}"
                  if key[1] == 1 else None)  # fmt: skip

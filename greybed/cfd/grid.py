@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,7 +70,7 @@ class Grid:
         nx, ny, nz = self.cells
         return (nz, ny, nx + 1), (nz, ny + 1, nx), (nz + 1, ny, nx)
 
-    @property
+    @cached_property
     def spacing(self) -> tuple[float, float, float]:
         """Edges of a cell along x, y and z [m]."""
         dx, dy, dz = (

@@ -47,11 +47,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--ranks", type=int, help="liggghts, lammps: MPI ranks (default: 1)")
     parser.add_argument(
-        "--plugin", type=Path, metavar="FILE", help="lammps: plugin made by greybed host"
+        "--plugin",
+        type=Path,
+        metavar="FILE",
+        help="made by greybed host: plugin of lammps, program of liggghts",
     )
     parser.add_argument(
         "--fix", action="append", default=[], metavar="WORDS",
-        help="lammps: a fix of the plugin for all particles; may be repeated",
+        help="a fix of the plugin for all particles; may be repeated",
     )  # fmt: skip
     parser.add_argument("--quiet", action="store_true", help="no progress bars")
 
@@ -72,10 +75,12 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(
             "--ranks is for --engine liggghts or lammps only; take --threads, or leave it out."
         )
+    if (options.plugin is not None or options.fix) and options.engine == "greybed":
+        raise InputError("--plugin and --fix are for --engine liggghts or lammps; leave them out.")
     kind = read_toml(options.case).get("kind")
     if kind == "particles" and options.engine != "greybed":
         return run_engine(options)
-    if options.engine != "greybed" or options.plugin or options.fix:
+    if options.engine != "greybed":
         raise InputError(f"--engine {options.engine} is for particles only; leave it out.")
     if kind in ("particles", "gas-particles"):
         return run_particles(options, gas=kind == "gas-particles")

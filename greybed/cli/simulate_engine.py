@@ -34,8 +34,6 @@ def run_engine(options: argparse.Namespace) -> int:
         raise InputError("--threads is for --engine greybed only; take --ranks, or leave it out.")
     if options.fix and options.plugin is None:
         raise InputError("--fix needs the plugin that has it; give --plugin FILE, or leave it out.")
-    if (options.plugin or options.fix) and options.engine != "lammps":
-        raise InputError("--plugin and --fix are for --engine lammps only; leave them out.")
     case = load_particle_case(options.case)
     files, inputs = files_of(case, options.case)
     folder = output_folder(options.out)
@@ -44,16 +42,13 @@ def run_engine(options: argparse.Namespace) -> int:
         packings = {k: read_packing(path) for k, path in files.items()}
         try:
             work = folder / options.engine
-            run: LiggghtsRun
+            engine: type[LiggghtsRun] = LiggghtsRun
             if options.engine == "lammps":
-                from greybed.dem.lammps import LammpsRun
-
-                run = LammpsRun(
-                    case, packings, work, ranks=ranks, plugin=options.plugin,
-                    fixes=tuple(options.fix),
-                )  # fmt: skip
-            else:
-                run = LiggghtsRun(case, packings, work, ranks=ranks)
+                from greybed.dem.lammps import LammpsRun as engine
+            run = engine(
+                case, packings, work, ranks=ranks, plugin=options.plugin,
+                fixes=tuple(options.fix),
+            )  # fmt: skip
             # A checkpoint of our own engine in this folder is of other results.
             (folder / CHECKPOINT).unlink(missing_ok=True)
             frames = Frames(run, folder, options.movie)

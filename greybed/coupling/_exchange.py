@@ -52,11 +52,8 @@ def _row(field, at, a):
 
 
 @njit(**_OPTIONS)
-def _weighted(field, i, a, j, b, k, c, nx, ny):
-    at, up = (k * ny + j) * nx + i, ny * nx
-    low = _row(field, at, a) * (1.0 - b) + _row(field, at + nx, a) * b
-    high = _row(field, at + up, a) * (1.0 - b) + _row(field, at + up + nx, a) * b
-    return low * (1.0 - c) + high * c
+def _pair(field, at, up, a, c):
+    return _row(field, at, a) * (1.0 - c) + _row(field, at + up, a) * c
 
 
 @njit(**_OPTIONS)
@@ -65,6 +62,9 @@ def read_faces(place, lower, spacing, cells, periodic, u, v, w, out):
     ox, oy, oz = 1.0 / spacing[0], 1.0 / spacing[1], 1.0 / spacing[2]
     nx, ny, nz = cells[0], cells[1], cells[2]
     px, py, pz = periodic[0], periodic[1], periodic[2]
+    # From a row to the next one, and to the one above, in each array.
+    ru, rv, rw = nx + 3, nx + 2, nx + 2
+    uu, uv, uw = ru * (ny + 2), rv * (ny + 3), rw * (ny + 2)
     for p in range(place.shape[0]):
         x = _in_turns((place[p, 0] - lower[0]) * ox, nx, px)
         y = _in_turns((place[p, 1] - lower[1]) * oy, ny, py)
@@ -75,9 +75,14 @@ def read_faces(place, lower, spacing, cells, periodic, u, v, w, out):
         i, a = _below(x - 0.5) if nx > 1 else (1, 0.0)
         j, b = _below(y - 0.5) if ny > 1 else (1, 0.0)
         k, c = _below(z - 0.5) if nz > 1 else (1, 0.0)
-        out[p, 0] = _weighted(u, fi, fa, j, b, k, c, nx + 3, ny + 2)
-        out[p, 1] = _weighted(v, i, a, fj, fb, k, c, nx + 2, ny + 3)
-        out[p, 2] = _weighted(w, i, a, j, b, fk, fc, nx + 2, ny + 2)
+        au, av, aw = k * uu + j * ru + fi, k * uv + fj * rv + i, fk * uw + j * rw + i
+        out[p, 1] = _pair(v, av, uv, a, c) * (1.0 - fb) + _pair(v, av + rv, uv, a, c) * fb
+        if b == 0.0:  # all is in one row
+            out[p, 0] = _pair(u, au, uu, fa, c)
+            out[p, 2] = _pair(w, aw, uw, a, fc)
+        else:
+            out[p, 0] = _pair(u, au, uu, fa, c) * (1.0 - b) + _pair(u, au + ru, uu, fa, c) * b
+            out[p, 2] = _pair(w, aw, uw, a, fc) * (1.0 - b) + _pair(w, aw + rw, uw, a, fc) * b
 
 
 @njit(**_OPTIONS)
@@ -106,7 +111,6 @@ def give_to_faces(place, lower, spacing, cells, periodic, k, target, u, v, w):
     nx, ny, nz = cells[0], cells[1], cells[2]
     px, py, pz = periodic[0], periodic[1], periodic[2]
     own = 1 if k.shape[1] == 3 else 0
-    # From a row to the next one, and to the one above, in each array.
     ru, rv, rw = nx + 3, nx + 2, nx + 2
     uu, uv, uw = ru * (ny + 2), rv * (ny + 3), rw * (ny + 2)
     for p in range(place.shape[0]):
@@ -175,3 +179,34 @@ def cell_means(u, v, w, out):
                 out[k, j, i, 0] = 0.5 * (u[k, j, i] + u[k, j, i + 1])
                 out[k, j, i, 1] = 0.5 * (v[k, j, i] + v[k, j + 1, i])
                 out[k, j, i, 2] = 0.5 * (w[k, j, i] + w[k + 1, j, i])
+
+
+@njit(inline="always", **_OPTIONS)
+def _slope(before, here, after, i, n, h, periodic):
+    """Mean of the slopes on both faces of cell i; on a rim that of the face inside."""
+    if n == 1:
+        return 0.0
+    low, high = (here - before) / h, (after - here) / h
+    if i == 0 and not periodic:
+        low = high
+    if i == n - 1 and not periodic:
+        high = low
+    return 0.5 * (low + high)
+
+
+@njit(**_OPTIONS)
+def cell_slopes(p, spacing, periodic, out):
+    """Fill ``out`` (nz, ny, nx, 3) with means of the gradients on the two faces of each cell."""
+    nz, ny, nx = p.shape
+    hx, hy, hz = spacing[0], spacing[1], spacing[2]
+    px, py, pz = periodic[0], periodic[1], periodic[2]
+    for k in range(nz):
+        up, down = (k + 1) % nz, k - 1 if k > 0 else nz - 1
+        for j in range(ny):
+            far, near = (j + 1) % ny, j - 1 if j > 0 else ny - 1
+            for i in range(nx):
+                right, left = (i + 1) % nx, i - 1 if i > 0 else nx - 1
+                here = p[k, j, i]
+                out[k, j, i, 0] = _slope(p[k, j, left], here, p[k, j, right], i, nx, hx, px)
+                out[k, j, i, 1] = _slope(p[k, near, i], here, p[k, far, i], j, ny, hy, py)
+                out[k, j, i, 2] = _slope(p[down, j, i], here, p[up, j, i], k, nz, hz, pz)

@@ -139,8 +139,11 @@ def survey(place, lower, spacing, cells, periodic):
 
 
 @njit(**_OPTIONS)
-def overlaps(place, lower, spacing, cells, periodic, most, first, cell, volume):
-    """Rows of cells and volumes of each sphere, ``first`` (n + 1,); the number of entries."""
+def overlaps(place, lower, spacing, cells, periodic, most, first, cell, volume, solids):
+    """Rows of cells and volumes of each sphere, ``first`` (n + 1,); the number of entries.
+
+    Adds the volumes to ``solids`` (cells,).
+    """
     table = np.empty((most + 1, most + 1, most + 1))
     nx, ny, nz = cells[0], cells[1], cells[2]
     px, py, pz = periodic[0], periodic[1], periodic[2]
@@ -178,11 +181,13 @@ def overlaps(place, lower, spacing, cells, periodic, most, first, cell, volume):
             volume[at] = beyond
             at += 1
     first[place.shape[0]] = at
+    for m in range(at):
+        solids[cell[m]] += volume[m]
     return at
 
 
 @njit(**_OPTIONS)
-def centre_cells(place, lower, spacing, cells, periodic, first, cell, volume):
+def centre_cells(place, lower, spacing, cells, periodic, first, cell, volume, solids):
     """The same with each sphere in the cell of its centre."""
     nx, ny, nz = cells[0], cells[1], cells[2]
     over = 1.0 / spacing
@@ -192,6 +197,7 @@ def centre_cells(place, lower, spacing, cells, periodic, first, cell, volume):
         z, _ = _planes(place[i, 2], place[i, 2], lower[2], over[2], nz, periodic[2])
         first[i], cell[i] = i, ((z % nz) * ny + y % ny) * nx + x % nx
         volume[i] = 4.0 / 3.0 * math.pi * place[i, 3] ** 3
+        solids[cell[i]] += volume[i]
     first[place.shape[0]] = place.shape[0]
     return place.shape[0]
 

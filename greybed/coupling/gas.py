@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from greybed.cfd.grid import Grid
+from greybed.coupling import _exchange
 
 Array = NDArray[np.float64]
 Faces = tuple[Array, Array, Array]
@@ -85,16 +86,8 @@ def cell_slopes(pressure: Array, grid: Grid) -> Array:
 
     On a rim, where the gas has none of its own, the one inside holds.
     """
-    out = np.zeros((*pressure.shape, 3))
-    for axis, h in enumerate(grid.spacing):
-        along, n = 2 - axis, grid.cells[axis]
-        if n == 1:
-            continue
-        inner = np.diff(pressure, axis=along) / h
-        first, last = inner.take([0], axis=along), inner.take([-1], axis=along)
-        if grid.periodic[axis]:
-            first = last = (pressure.take([0], axis=along) - pressure.take([-1], axis=along)) / h
-        low = np.concatenate([first, inner], axis=along)
-        high = np.concatenate([inner, last], axis=along)
-        out[..., axis] = 0.5 * (low + high)
+    out = np.empty((*pressure.shape, 3))
+    _exchange.cell_slopes(
+        np.ascontiguousarray(pressure), np.array(grid.spacing), np.array(grid.periodic), out
+    )
     return out

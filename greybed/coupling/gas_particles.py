@@ -330,7 +330,8 @@ class GasParticles:
 
     def _slopes(self) -> Array:
         """Pressure gradient of the cells, smoothed as all that is exchanged is [Pa/m]."""
-        slopes: Array = cell_slopes(self.gas.pressure, self.gas.grid) + imposed_gradient(self.gas)
+        slopes = cell_slopes(self.gas.pressure, self.gas.grid)
+        slopes += imposed_gradient(self.gas)
         if not self.smoother.idle:
             for c in range(3):
                 slopes[..., c] = self.smoother.cells(slopes[..., c])

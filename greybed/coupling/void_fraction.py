@@ -65,24 +65,29 @@ class Overlaps:
         across = [int(2.0 * largest / h) + 2 for h in grid.spacing]
         most, entries = max(across), n if method == "centre" else n * math.prod(across)
         cell, volume = np.empty(entries, np.int64), np.empty(entries)
+        self._solids = np.zeros(grid.shape)
+        found = (self.first, cell, volume, self._solids.reshape(-1))
         if method == "centre":
-            used = _overlap.centre_cells(place, *shape, self.first, cell, volume)
+            used = _overlap.centre_cells(place, *shape, *found)
         else:
-            used = _overlap.overlaps(place, *shape, most, self.first, cell, volume)
+            used = _overlap.overlaps(place, *shape, most, *found)
         self.cell, self.volume = cell[:used], volume[:used]
-        r = place[:, 3]
-        self._whole = 4.0 / 3.0 * np.pi * (r * r * r)  # numpy's powers are slow
+        self._radii = place[:, 3].copy()
+
+    @property
+    def _whole(self) -> Array:
+        r = self._radii
+        whole: Array = 4.0 / 3.0 * np.pi * (r * r * r)  # numpy's powers are slow
+        return whole
 
     def solids(self) -> Array:
         """Volumes in the cells, shape (nz, ny, nx) [m3]."""
-        cells = int(np.prod(self.grid.shape))
-        out: Array = np.bincount(self.cell, self.volume, minlength=cells).astype(np.float64)
-        return out.reshape(self.grid.shape)
+        return self._solids.copy()
 
     def integral(self, fields: Array) -> Array:
         """Integrals over each sphere of fields (nz, ny, nx, k), constant in cells; (n, k) [m3]."""
         fields = np.ascontiguousarray(fields)
-        out = np.empty((len(self._whole), fields.shape[-1]))
+        out = np.empty((len(self._radii), fields.shape[-1]))
         flat = fields.reshape(-1, fields.shape[-1])
         _overlap.collect(self.first, self.cell, self.volume, flat, out)
         return out

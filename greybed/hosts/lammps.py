@@ -39,7 +39,7 @@ def generate_fix(model: HostModel, engine: str, folder: Path, main: dict[str, st
     return write_adapter(model, engine, folder, files)
 
 
-def build(folder: Path) -> float:
+def build(folder: Path, flags: tuple[str, ...] = FLAGS) -> float:
     """Compile the plugin; returns seconds.
 
     Raises
@@ -51,7 +51,7 @@ def build(folder: Path) -> float:
     if compiler is None or shutil.which(compiler[0]) is None:
         raise InputError("no C++ compiler found: install g++, or set CXX.")
     words: list[str | Path] = [
-        *compiler, *FLAGS, "-DLAMMPS_SMALLBIG", "-I.", f"-I{lammps.headers}",
+        *compiler, *flags, "-DLAMMPS_SMALLBIG", "-I.", f"-I{lammps.headers}",
         f"-I{lammps.root / 'include'}", "greybedplugin.cpp", "-o", PLUGIN,
     ]  # fmt: skip
     return run_command(words, folder, BUILD_LOG, "the build of the plugin")

@@ -29,7 +29,7 @@ def generate(model: HostModel, folder: Path) -> list[str]:
     return generate_fix(model, "liggghts", folder, {"driver.cpp": "liggghts/driver.cpp"})
 
 
-def build(folder: Path) -> float:
+def build(folder: Path, flags: tuple[str, ...] = FLAGS) -> float:
     """Compile the driver; returns seconds.
 
     Raises
@@ -40,7 +40,7 @@ def build(folder: Path) -> float:
     if lacking := missing_liggghts():
         raise InputError(f"the host liggghts needs {lacking}.")
     words: list[str | Path] = [
-        "mpicxx", *FLAGS, "-I.", f"-I{HEADERS}", "driver.cpp", "-lliggghts", "-o", PROGRAM,
+        "mpicxx", *flags, "-I.", f"-I{HEADERS}", "driver.cpp", "-lliggghts", "-o", PROGRAM,
     ]  # fmt: skip
     return run_command(words, folder, BUILD_LOG, "the build of the driver")
 

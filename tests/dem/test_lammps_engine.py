@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from liggghts_cases import HEAD, SOME, apart, pack, planes
 
+from greybed.cli.main import main
 from greybed.core.errors import InputError
 from greybed.dem.case import load_particle_case
 from greybed.dem.lammps import LammpsRun, process
@@ -122,6 +123,27 @@ def test_ranks_change_nothing(tmp_path):
     assert apart(ran(tmp_path, text), ran(tmp_path, text, ranks=2)) < 1e-9
 
 
+@needs_lammps
+def test_heat_goes_the_same_way(tmp_path):
+    """Warm and cold smooth spheres on a hot floor; heat looks at contacts each second step here."""
+    text = smooth(HEAD.format(**{**SOME, "duration": 0.03})) + planes() + pack(8) + pack(6)
+    text = text.replace("density = 2500", "density = 2500\nconductivity = 50\nheat_capacity = 20")
+    text = text.replace('name = "z0"', 'name = "z0"\ntemperature = 900')
+    text = text.replace("seed = 1\n", "seed = 1\nlook = 2e-5\n", 1)
+    head, _, tail = text.rpartition("upper = [")
+    text = f"{head}temperature = 500\nupper = [{tail}\n[heat]\ntemperature = 300\n"
+    mine, theirs = own(tmp_path, text), ran(tmp_path, text)
+    for name in ("mean temperature [K]", "heat from z0 [J]"):
+        a, b = mine.tally.history[-1][name], theirs.tally.history[-1][name]
+        start = mine.tally.history[0][name]
+        assert abs(a - start) > 0.0
+        assert b - start == pytest.approx(a - start, rel=0.01)
+    t, other = mine.heat.temperatures, theirs.heat.temperatures
+    assert np.ptp(t) > 50.0
+    # LAMMPS takes every step; impacts last a hundred.
+    assert np.abs(t - other).max() < 0.01 * np.ptp(t)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
@@ -137,6 +159,21 @@ def test_what_the_deck_does_not_carry_is_refused_by_name(tmp_path, old, new, sai
     path.write_text(text.replace(old, new))
     with pytest.raises(InputError, match=said):
         check(load_particle_case(path))
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--fix", "viscous 1"], "are for --engine liggghts or lammps"),
+        (["--engine", "lammps", "--fix", "viscous 1"], "--fix needs the plugin"),
+        (["--engine", "liggghts", "--plugin", "nowhere"], "is no program"),
+    ],
+)
+def test_plugins_without_their_engine_are_refused(tmp_path, capsys, words, said):
+    path = tmp_path / "case.toml"
+    path.write_text(HEAD.format(**SOME) + planes() + pack(3))
+    assert main(["simulate", str(path), "--out", str(tmp_path / "out"), *words]) == 2
+    assert said in capsys.readouterr().err
 
 
 def test_lammps_that_is_missing_is_named(monkeypatch, tmp_path):

@@ -29,7 +29,7 @@ from greybed.export.replay import CPP_TOLERANCE, ONNX_TOLERANCE, replay
 FORMS = [(kind, markers) for kind in ("mlp", "forest") for markers in MARKER_SETS]
 # A call of the compiler takes seconds: each form once, with -ffast-math or without.
 PLAIN = ("-std=c++11", "-O1", *WARNINGS)
-FAST = ("-std=c++17", "-O3", "-march=native", "-ffast-math", *WARNINGS)
+FAST = ("-std=c++17", "-O2", "-march=native", "-ffast-math", *WARNINGS)
 BUILT = [
     ("mlp", "plain", PLAIN), ("mlp", "gradient", FAST), ("mlp", "linear", FAST),
     ("mlp", "full", PLAIN), ("mlp", "full", FAST), ("forest", "full", FAST),

@@ -1,6 +1,7 @@
 """Force and drag model in OpenFOAM: tutorial cases run, and move as with OpenFOAM's own law."""
 
 import re
+import shutil
 
 import numpy as np
 import pytest
@@ -78,6 +79,18 @@ def test_mppicfoam_runs_with_the_closure(adapter, tmp_path):
     log = ran("MPPICFoam", tmp_path / "case", adapter / openfoam.LIBRARIES)
     assert "Selecting particle force greybedDrag" in log
     assert counts(log)[0] > 0.0
+
+
+@pytest.mark.skipif(shutil.which("mpirun") is None, reason="mpirun is not installed")
+def test_two_ranks_count_what_both_have_done(adapter, tmp_path):
+    library = adapter / openfoam.LIBRARIES
+    openfoam.lay_out("twoPhaseEulerFoam", tmp_path / "case", 1)
+    openfoam.run_case("twoPhaseEulerFoam", tmp_path / "case", library, ranks=2)
+    both = counts((tmp_path / "case" / "log").read_text())
+    one = counts(ran("twoPhaseEulerFoam", tmp_path / "one", library, steps=1))
+    assert both[0] == one[0]
+    # The pressure solver's residual may move a cell over the edge of the training data.
+    assert both[1] == pytest.approx(one[1], abs=20)
 
 
 def test_two_fluids_use_the_closure_where_it_was_trained(adapter, tmp_path):

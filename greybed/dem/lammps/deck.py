@@ -12,6 +12,7 @@ from greybed.core.walls import Cone, Cylinder, Disc, Plane
 from greybed.dem.case_tables import WallTable
 from greybed.dem.damping import damping
 from greybed.dem.lammps.limits import NORMAL
+from greybed.dem.lammps.warmth import conduction, temperatures
 from greybed.dem.liggghts.deck import DATA, TOLD, Deck
 from greybed.dem.liggghts.places import box_of, region_of
 from greybed.dem.liggghts.sources import data_text
@@ -20,6 +21,7 @@ from greybed.dem.runner import ParticleRun
 
 DECK, LOG = "in.lammps", "log.lammps"
 FIELDS = "id type x y z vx vy vz omegax omegay omegaz radius mass c_touch"
+WARM = " c_warm"  # one more where particles have temperatures
 _SKIN = 0.25
 # Half the height over the radius of what stands for a disc.
 _THIN = 1e-8
@@ -52,7 +54,9 @@ def deck_of(run: ParticleRun, extra: tuple[str, ...] = ()) -> Deck:
     lines = [
         "# A case of particles, written by greybed simulate --engine lammps.",
         "units si", "atom_style sphere", "atom_modify map array", f"boundary {edges}",
-        "newton off", "comm_modify vel yes", f"processors {cut}", f"read_data {DATA}",
+        "newton off", "comm_modify vel yes", f"processors {cut}",
+        *(["fix warm all property/atom temperature heatflow ghost yes"] if case.heat else []),
+        f"read_data {DATA}",
         f"neighbor {_SKIN * float(sim.radii.mean())!r} bin",
         "neigh_modify delay 0 every 1 check yes",
         *_laws(run), f"timestep {sim.time_step!r}",
@@ -73,16 +77,18 @@ def deck_of(run: ParticleRun, extra: tuple[str, ...] = ()) -> Deck:
     every = 0
     if case.output.frames is not None:
         every = max(1, round(case.output.frames / sim.time_step))
+    fields = FIELDS + (WARM if case.heat else "")
     lines += [
-        *extra, "fix integrate all nve/sphere", "compute touch all contact/atom",
+        *temperatures(run), *extra, "fix integrate all nve/sphere",
+        "compute touch all contact/atom",
         "variable nothing equal 0", "variable now equal step",
         f'fix tell all print {run.look} "{TOLD} ${{now}}"',
-        f"dump samples all custom {run._sample} sample.*.dump {FIELDS}",
+        f"dump samples all custom {run._sample} sample.*.dump {fields}",
         "dump_modify samples format float %.17g",
     ]  # fmt: skip
     if every:
         lines += [
-            f"dump frames all custom {every} frame.*.dump {FIELDS}",
+            f"dump frames all custom {every} frame.*.dump {fields}",
             "dump_modify frames format float %.17g",
         ]
     stops = sorted({0, run.steps} | {int(end) for end in ends if end < run.steps})
@@ -96,7 +102,7 @@ def deck_of(run: ParticleRun, extra: tuple[str, ...] = ()) -> Deck:
         words = "".join(f' "{line}"' for line in looks)
         lines.append(f"run {end - step}" + (f" every {run.look}{words}" if looks else ""))
     lines += [
-        "undump samples", f"dump last all custom 1 last.*.dump {FIELDS}",
+        "undump samples", f"dump last all custom 1 last.*.dump {fields}",
         "dump_modify last format float %.17g", "run 0",
     ]  # fmt: skip
     density = np.array([material.density for material in sim.materials])[sim.kinds]
@@ -129,6 +135,7 @@ def _laws(run: ParticleRun) -> list[str]:
             if contact is None:
                 contact = next(iter(contacts.values()))
             words = _law(run, sim.materials[i], sim.materials[j], contact)
+            words += conduction(run, i, j)
             lines.append(f"pair_coeff {i + 1} {j + 1} {words}{limit}")
     return lines
 
@@ -188,8 +195,11 @@ def _wall(run: ParticleRun, k: int, wall: WallTable, box: np.ndarray) -> list[st
             "need laws of their own; take --engine greybed or liggghts."
         )
     words = _law_words(run, kinds[0], of_wall, found[0])
+    if wall.temperature is not None:
+        words += conduction(run, kinds[0], kinds[0])
     if case.contact_law.limit_force:
         words += " limit_damping"
+    warm = "" if wall.temperature is None else f" temperature {wall.temperature!r}"
     shape = wall.wall()
     region = f"region wall_{k} "
     if isinstance(shape, Plane):
@@ -202,7 +212,7 @@ def _wall(run: ParticleRun, k: int, wall: WallTable, box: np.ndarray) -> list[st
         region += _round(shape, box)
     return [
         region,
-        f"fix wall_{k} all wall/gran/region granular {words} region wall_{k} contacts",
+        f"fix wall_{k} all wall/gran/region granular {words} region wall_{k}{warm} contacts",
         f"compute push_{k} all reduce sum f_wall_{k}[2] f_wall_{k}[3] f_wall_{k}[4]",
     ]
 

@@ -32,7 +32,7 @@ def check(case: ParticleCase) -> None:
         if name != "none":
             raise _cannot(f"law.{what} = {name!r}", f"{_REMEDY}, or none")
     if case.heat is not None:
-        raise _cannot("[heat]", f"{_OWN}, or leave [heat] out")
+        _check_heat(case)
     for table in case.measure:
         if isinstance(table, StressTable | ConductionTable):
             raise _cannot(f"measure {table.name!r}, which needs the force of each contact", _OWN)
@@ -52,6 +52,17 @@ def check(case: ParticleCase) -> None:
                 f"{_OWN}, or leave it out",
             )
     _check_walls(case)
+
+
+def _check_heat(case: ParticleCase) -> None:
+    """LAMMPS does not tell what each wall gives: it is found from what the particles have."""
+    warm = [wall.name for wall in case.wall if wall.temperature is not None]
+    if len(warm) > 1:
+        raise _cannot(
+            f"[heat] with several warm walls, {', '.join(warm)}", f"{_OWN}, or one warm wall"
+        )
+    if warm and case.sink:
+        raise _cannot(f"[heat] from wall {warm[0]!r} beside a [[sink]]", _OWN)
 
 
 def _check_walls(case: ParticleCase) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 from subprocess import Popen
 
@@ -13,9 +14,11 @@ from numpy.typing import NDArray
 from greybed.core.errors import InputError
 from greybed.core.packing import Packing
 from greybed.dem.case import ParticleCase
-from greybed.dem.lammps.deck import DECK, FIELDS, LOG, deck_of
+from greybed.dem.case_heat import sample_of
+from greybed.dem.lammps.deck import DECK, FIELDS, LOG, WARM, deck_of
 from greybed.dem.lammps.limits import check
 from greybed.dem.lammps.process import needed_lammps
+from greybed.dem.lammps.warmth import Warmth
 from greybed.dem.liggghts.deck import Deck
 from greybed.dem.liggghts.process import started
 from greybed.dem.liggghts.run import LiggghtsRun
@@ -64,11 +67,13 @@ class LammpsRun(LiggghtsRun):
         plugin: Path | None = None,
         fixes: tuple[str, ...] = (),
     ) -> None:
-        self._extra: tuple[str, ...] = ()
-        if plugin is not None:
-            self._extra = (f"plugin load {plugin.resolve()}",)
-        self._extra += tuple(f"fix host_{k} all {fix}" for k, fix in enumerate(fixes))
-        super().__init__(case, packings, folder, ranks=ranks)
+        self._capacity: Array | None = None
+        super().__init__(case, packings, folder, ranks=ranks, plugin=plugin, fixes=fixes)
+        if self._capacity is not None:
+            rows = np.column_stack([self.simulation.rows, self._temperatures])
+            self.simulation = replace(self.simulation, rows=rows)
+            walls = [wall.temperature is not None for wall in case.wall]
+            self.heat = Warmth(self, self._capacity, walls)
 
     def _words(self, ranks: int) -> list[str]:
         return needed_lammps().command(ranks, "-in", DECK, "-log", LOG, "-echo", "none", "-nocite")
@@ -77,7 +82,10 @@ class LammpsRun(LiggghtsRun):
         check(case)
 
     def _deck(self, start: ParticleRun) -> Deck:
-        return deck_of(start, self._extra)
+        if start.heat is not None:
+            self._capacity, self._temperatures = start.heat._capacity, start.heat.temperatures
+        loads = () if self._plugin is None else (f"plugin load {self._plugin}",)
+        return deck_of(start, (*loads, *self._fixes))
 
     def _started(self) -> AbstractContextManager[Popen[str]]:
         return started(self.words, self.folder, needed_lammps().environment)
@@ -95,6 +103,11 @@ class LammpsRun(LiggghtsRun):
             time.sleep(0.005)
         return super()._take(step)
 
+    def _note(self) -> None:
+        super()._note()
+        if self.heat is not None:
+            self.tally.history[-1] |= sample_of(self.case, self.heat)
+
     def _read(self, path: Path) -> Array:
         """Rows of a text dump, in the order of the numbers of particles.
 
@@ -105,22 +118,23 @@ class LammpsRun(LiggghtsRun):
             different ways.
         """
         last = time.monotonic() + PATIENCE
-        while (rows := _rows_of(path)) is None:
+        fields = FIELDS + (WARM if self._capacity is not None else "")
+        while (rows := _rows_of(path, fields)) is None:
             if time.monotonic() > last:
                 raise InputError(f"{path}: this dump of LAMMPS is cut short; run again.")
             time.sleep(0.01)
         return rows[np.argsort(rows[:, 0], kind="stable")]
 
 
-def _rows_of(path: Path) -> Array | None:
+def _rows_of(path: Path, fields: str) -> Array | None:
     """Rows of a dump, or None while it is not whole."""
     head, _, body = path.read_text().partition("ITEM: ATOMS ")
     names, ended, numbers = body.partition("\n")
-    if not ended or names.split() != FIELDS.split():
+    if not ended or names.split() != fields.split():
         return None
     count = int(head.split("ITEM: NUMBER OF ATOMS\n")[1].split("\n")[0])
     words = numbers.split()
-    width = len(FIELDS.split())
+    width = len(fields.split())
     if len(words) != count * width or (count and not numbers.endswith("\n")):
         return None
     return np.array(words, dtype=np.float64).reshape(-1, width)

@@ -58,21 +58,29 @@ class Deck:
                 part.write_text(text)
 
 
-def deck_of(run: ParticleRun) -> Deck:
+def deck_of(run: ParticleRun, extra: tuple[str, ...] = ()) -> Deck:
     """The deck of a case that is ready to run, with the spheres that it starts with.
+
+    Parameters
+    ----------
+    run : ParticleRun
+        The case.
+    extra : tuple of str
+        Lines with fixes of a host.
 
     Raises
     ------
     InputError
         For what LIGGGHTS cannot do.
     """
-    return _Writer(run).deck()
+    return _Writer(run, extra).deck()
 
 
 class _Writer:
     """Writes a deck; ``lines`` grow from top to bottom."""
 
-    def __init__(self, run: ParticleRun) -> None:
+    def __init__(self, run: ParticleRun, extra: tuple[str, ...]) -> None:
+        self.extra = extra
         self.run, self.case, self.sim = run, run.case, run.simulation
         case, sim = self.case, self.sim
         self.law = case.contact_law
@@ -195,7 +203,7 @@ class _Writer:
                 f"variable count_in_{k} equal count(all,sink_{k})",
             ]
         self.lines += [
-            "fix integrate all nve/sphere", "compute touch all contact/atom",
+            *self.extra, "fix integrate all nve/sphere", "compute touch all contact/atom",
             "variable nothing equal 0", "variable now equal step",
             f'fix tell all print {run.look} "{TOLD} ${{now}}"',
             f"dump samples all custom {run._sample} sample.*.bin {FIELDS}",

@@ -17,7 +17,7 @@ from greybed.core.errors import InputError
 _PARENT_DIES = 1  # PR_SET_PDEATHSIG
 
 
-def command(ranks: int, deck: str, log: str) -> list[str]:
+def command(ranks: int, deck: str, log: str, program: str = "liggghts") -> list[str]:
     """Words that run a deck on so many ranks.
 
     Raises
@@ -27,8 +27,12 @@ def command(ranks: int, deck: str, log: str) -> list[str]:
     """
     if ranks < 1:
         raise InputError(f"--ranks = {ranks} [-] must be at least 1.")
-    words = ["liggghts", "-in", deck, "-log", log, "-echo", "none"]
-    if shutil.which("liggghts") is None:
+    words = [program, "-in", deck, "-log", log, "-echo", "none"]
+    if shutil.which(program) is None and program != "liggghts":
+        raise InputError(
+            f"--plugin {program} is no program; make it with greybed host liggghts MODEL --build."
+        )
+    if shutil.which(program) is None:
         raise InputError(
             "--engine liggghts needs the program liggghts, which is not installed; install "
             "Debian's package liggghts (apt-get install liggghts), or take --engine greybed."

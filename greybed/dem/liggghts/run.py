@@ -8,6 +8,7 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 from subprocess import Popen
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,10 @@ class LiggghtsRun:
         For deck, data, meshes, dumps and LIGGGHTS' log.
     ranks : int
         MPI ranks.
+    plugin : Path, optional
+        Program of ``greybed host liggghts`` in place of ``liggghts``.
+    fixes : sequence of str
+        Its fixes, such as ``greybed/drag gas 1.2 1.8e-5 velocity 0 0 1 cell 3e-3``.
 
     Attributes
     ----------
@@ -55,13 +60,22 @@ class LiggghtsRun:
         For what LIGGGHTS cannot do, programs that are missing, and what our own engine refuses.
     """
 
-    heat = None
+    heat: Any = None
     engine, deck_name, log_name, version_head = "LIGGGHTS", DECK, LOG, "LIGGGHTS ("
     dumps = ".bin"
 
     def __init__(
-        self, case: ParticleCase, packings: dict[int, Packing], folder: Path, *, ranks: int = 1
+        self,
+        case: ParticleCase,
+        packings: dict[int, Packing],
+        folder: Path,
+        *,
+        ranks: int = 1,
+        plugin: Path | None = None,
+        fixes: tuple[str, ...] = (),
     ) -> None:
+        self._plugin = None if plugin is None else plugin.resolve()
+        self._fixes = tuple(f"fix host_{k} all {fix}" for k, fix in enumerate(fixes))
         self.words = self._words(ranks)
         self._check(case)
         # Our own engine finds places and time step, and refuses what neither of both can run.
@@ -140,13 +154,13 @@ class LiggghtsRun:
     # -- what differs between engines -------------------------------------------------------
 
     def _words(self, ranks: int) -> list[str]:
-        return command(ranks, DECK, LOG)
+        return command(ranks, DECK, LOG, "liggghts" if self._plugin is None else str(self._plugin))
 
     def _check(self, case: ParticleCase) -> None:
         check(case)
 
     def _deck(self, start: ParticleRun) -> Deck:
-        return deck_of(start)
+        return deck_of(start, self._fixes)
 
     def _started(self) -> AbstractContextManager[Popen[str]]:
         return started(self.words, self.folder)

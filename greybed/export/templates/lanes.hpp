@@ -200,7 +200,11 @@ GREYBED_HOT v4 four(double a, double b, double c, double d) {
 }
 #else
 GREYBED_HOT v4 four(double a, double b, double c, double d) {
-  const v4 v = {{ '{{a, b}, {c, d}}' }};
+  v4 v;
+  v.a.a = a;
+  v.a.b = b;
+  v.b.a = c;
+  v.b.b = d;
   return v;
 }
 #endif
