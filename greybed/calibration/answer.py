@@ -136,7 +136,7 @@ def answer(search: Search, begin: float) -> Answer:
     space = study.space
     posterior = sample_posterior(model.log_posterior, space, o.seed)
     best = best_point(model, o.seed, posterior.points)
-    found = directions(model, best)
+    found = directions(model, best, posterior.points)
     misfit = float(model.chi2(best[None])[0])
     freedom = model.numbers + model.outside[1] - effective_number(found)
     p_value = float(chi2_distribution.sf(misfit, freedom)) if freedom >= 0.5 else None

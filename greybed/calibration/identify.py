@@ -19,6 +19,7 @@ Word = Literal["determined", "one-sided", "open"]
 # A direction or parameter is determined where its posterior variance is below this share of the
 # prior one: half of the standard deviation.
 DETERMINED = 0.25
+_LOOKS = 32  # samples of the posterior at which directions are looked at
 _STEP = 0.04  # of finite differences in the unit cube
 _END = 0.1  # share of the prior at an end of a range
 _GONE, _KEPT = 0.1, 0.3  # posterior over prior mass there: excluded, kept
@@ -104,29 +105,48 @@ def slopes(emulator: Emulator, u: Array, scale: Array) -> tuple[Array, Array]:
 def information(model: Metamodel, u: Array) -> Array:
     """J' S^-1 J of all measured data at a point, parameters in prior sds, (d, d) [-].
 
-    Slopes that are smaller than their own error count as none.
+    Slopes that are smaller than twice their own error count as none.
     """
     scale = model.space.prior_sd
     total = np.zeros((len(scale), len(scale)))
     for emulator in model.emulators:
         slope, error = slopes(emulator, u, scale)
-        slope = np.where(np.abs(slope) > error, slope, 0.0)
+        slope = np.where(np.abs(slope) > 2.0 * error, slope, 0.0)
         _, sd = emulator.predict(u[None])
         total += slope.T @ np.linalg.solve(emulator.covariances(sd)[0], slope)
     return total
 
 
-def directions(model: Metamodel, u: Array) -> list[Direction]:
+def directions(model: Metamodel, u: Array, samples: Array | None = None) -> list[Direction]:
     """Directions at a point, the best determined one first.
+
+    Parameters
+    ----------
+    model : Metamodel
+        Surrogates.
+    u : ndarray (d,)
+        The best set, in the unit cube [-].
+    samples : ndarray (n, d), optional
+        Of the posterior: a direction has no more information than that of its rank has at half of
+        them, so that a best set where measures happen to be steep does not count for all.
+
+    Notes
+    -----
 
     Those that are open span a space in which any basis is as good: the one is taken that needs the
     fewest parameters for each (varimax: Kaiser, Psychometrika 23 (1958) 187).
     """
     matrix = information(model, u)
     values, vectors = np.linalg.eigh(matrix)
+    if samples is not None:
+        step = max(1, len(samples) // _LOOKS)
+        around = [np.linalg.eigvalsh(information(model, s)) for s in samples[::step][:_LOOKS]]
+        values = np.minimum(values, np.median(around, axis=0))
     left = 1.0 / (1.0 + np.maximum(values, 0.0)) > DETERMINED
     vectors[:, left] = _varimax(vectors[:, left])
-    values = np.einsum("ij,ik,kj->j", vectors, matrix, vectors)
+    if left.any():
+        turned = np.einsum("ij,ik,kj->j", vectors[:, left], matrix, vectors[:, left])
+        values[left] = np.minimum(turned, values[left].max())
     found = []
     for k in np.argsort(-values, kind="stable"):
         size = max(float(values[k]), 0.0)
