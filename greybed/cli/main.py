@@ -30,6 +30,7 @@ VERBS = {
     "campaign": ("campaign", "run a case with many values, on one machine or a cluster"),
     "host": ("host", "put a closure into LAMMPS, LIGGGHTS or OpenFOAM"),
     "simulate": ("simulate", "run a coupled case from a TOML file"),
+    "calibrate": ("calibrate", "find parameters from measured bulk behaviour, and their ambiguity"),
     "diagnose": ("diagnose", "trace a residual to the effect that a model lacks"),
     "blindtest": ("blindtest", "test the residual analysis on sealed data sets"),
     "doctor": ("doctor", "check the installation, compilers and engines"),

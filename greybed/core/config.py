@@ -81,6 +81,11 @@ def wholes(default: Any = MISSING) -> Any:
     return dataclasses.field(default=default, metadata={"wholes": True})
 
 
+def plain(default: Any = MISSING) -> Any:
+    """Field of a case: any value as it stands; who uses it checks it."""
+    return dataclasses.field(default=default, metadata={"plain": True})
+
+
 @dataclasses.dataclass(frozen=True)
 class _Place:
     """Where a value stands: file and dotted key."""
@@ -132,9 +137,8 @@ def read_case(path: str | os.PathLike[str], kind: type[T]) -> T:
         The file.
     kind : dataclass
         Fields made by :func:`quantity`, :func:`vector`, :func:`whole`, :func:`choice`,
-        :func:`tables`, :func:`rows`, :func:`words`, :func:`counts`, or plain ones of type str,
-        bool, int, Path
-        (relative to the file), or a dataclass.
+        :func:`tables`, :func:`rows`, :func:`words`, :func:`counts`, :func:`plain`, or plain ones of
+        type str, bool, int, Path (relative to the file), or a dataclass.
 
     Returns
     -------
@@ -184,6 +188,8 @@ def _table(kind: type[T], table: Any, place: _Place) -> T:
 
 def _wanted(hint: Any, field: dataclasses.Field[Any]) -> str:
     """What a required key takes, for the message that it is missing."""
+    if "plain" in field.metadata:
+        return "its value"
     if "options" in field.metadata:
         return "one of " + ", ".join(map(repr, field.metadata["options"]))
     if "dimension" in field.metadata:
@@ -208,6 +214,8 @@ def _wanted(hint: Any, field: dataclasses.Field[Any]) -> str:
 def _value(value: Any, hint: Any, rules: Mapping[str, Any], place: _Place) -> Any:
     if get_origin(hint) in (Union, types.UnionType):  # X | None: TOML has no null, so take X
         hint = next(h for h in get_args(hint) if h is not types.NoneType)
+    if "plain" in rules:
+        return value
     if "variants" in rules:
         return _variants(value, rules["key"], rules["variants"], place)
     if "rows" in rules:

@@ -239,3 +239,41 @@ def parse_to_base(text: str, where: str = "value") -> float:
     if not np.isfinite(value):
         raise InputError(f"{where}: {_shown(text)} is not finite; give a finite number.")
     return value
+
+
+def in_unit(value: Any, unit: str, where: str = "value") -> float:
+    """A number in ``unit``, from one that stands in it or a string with a unit of its own.
+
+    Parameters
+    ----------
+    value : float or str
+        As in a file: ``0.6`` is in ``unit`` [unit], ``"34 deg"`` is converted.
+    unit : str
+        The unit that is wanted, empty for pure numbers.
+    where : str
+        Place named in an error.
+
+    Raises
+    ------
+    InputError
+        If it is no finite number, or its unit measures something else.
+    """
+    if isinstance(value, str):
+        match = _QUANTITY.fullmatch(value)
+        if match is None:
+            raise InputError(
+                f"{where}: {_shown(value)} is not a number with a unit; write it like '1.5 mm'."
+            )
+        found, base = to_base(float(match[1]), match[2], where)
+        one, wanted = to_base(1.0, unit, where)
+        if base != wanted and match[2]:
+            raise InputError(
+                f"{where}: unit {_shown(match[2])} does not measure the same as "
+                f"{unit or 'a number'}; give it in {unit or 'pure numbers'}."
+            )
+        value = float(found) / float(one) if match[2] else float(match[1])
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise InputError(f"{where} = {value!r} must be a number [{unit or '-'}].")
+    if not np.isfinite(value):
+        raise InputError(f"{where} = {value} [{unit or '-'}] must be finite; mend it.")
+    return float(value)
