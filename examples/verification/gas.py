@@ -98,6 +98,8 @@ def main() -> None:
     second = errors[0, 1] * (sizes[0] / sizes) ** 2.0
     axes[1].loglog(sizes, second, "k--", lw=0.8, label="second order")
     axes[1].set(xlabel="cells per side", title="Taylor-Green vortices")
+    axes[1].set_xticks(sizes, labels=[str(n) for n in sizes])
+    axes[1].xaxis.set_minor_formatter("")
     axes[1].legend()
     z, t = heated(40)
     fine = np.linspace(0, 0.1, 200)

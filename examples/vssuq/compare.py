@@ -45,17 +45,18 @@ def run(path: Path) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def write_predicted(runs: list[dict[str, Any]]) -> None:
-    """All runs; times that were not reached are left empty."""
+def write_predicted(runs: list[dict[str, Any]], slope: float) -> None:
+    """All runs, and the slope of all; times that were not reached are left empty."""
     with open(HERE / "predicted.csv", "w", newline="") as file:
         out = csv.writer(file)
         out.writerow(["condition [-]", "seed [-]", "share of the stated velocity [-]",
-                      "order of emergence [-]", "rise time [s]", "simulated [s]"])  # fmt: skip
+                      "order of emergence [-]", "rise time [s]", "simulated [s]",
+                      "d ln(time) / d ln(velocity) [-]"])  # fmt: skip
         for r in runs:
             for order, time in enumerate(r["seen"], start=1):
                 shown = f"{time:.2f}" if np.isfinite(time) else ""
                 out.writerow([r["condition"], r["seed"], r["share"], order, shown,
-                              f"{r['time'][-1]:.2f}"])  # fmt: skip
+                              f"{r['time'][-1]:.2f}", f"{slope:.3f}"])  # fmt: skip
 
 
 def write_measured(simulated: set[tuple[int, int]]) -> None:
@@ -74,15 +75,18 @@ def write_measured(simulated: set[tuple[int, int]]) -> None:
 
 
 def sensitivity(runs: list[dict[str, Any]]) -> float:
-    """d ln(rise time) / d ln(velocity), from runs with the same seed at two velocities."""
-    found = []
+    """d ln(rise time) / d ln(velocity), from runs that differ in nothing but the velocity."""
+    found, conditions = [], rows_of("conditions.csv")
     for r in runs:
         for other in runs:
-            same = (r["condition"], r["seed"]) == (other["condition"], other["seed"])
-            if same and r["share"] == 1.0 and other["share"] != 1.0:
+            one, two = conditions[r["condition"] - 1], conditions[other["condition"] - 1]
+            same = all(one[k] == two[k] for k in ("bed mass [g]", "intruders [-]", "size"))
+            fast, slow = (
+                float(c["U [m/s]"]) * x["share"] for c, x in ((one, r), (two, other))
+            )  # fmt: skip
+            if same and r["seed"] == other["seed"] and fast > slow:
                 both = np.isfinite(r["seen"]) & np.isfinite(other["seen"])
-                change = np.log(other["seen"][both] / r["seen"][both])
-                found += list(change / np.log(other["share"]))
+                found += list(np.log(other["seen"] / r["seen"])[both] / np.log(slow / fast))
     return float(np.mean(found)) if found else np.nan
 
 
@@ -91,9 +95,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=Path, required=True)
     runs = [run(p) for p in sorted(parser.parse_args().runs.glob("rise-*.csv"))]
-    write_predicted(runs)
     as_stated = [r for r in runs if r["share"] == 1.0]
     slope, conditions = sensitivity(runs), rows_of("conditions.csv")
+    write_predicted(runs, slope)
     print(f"d ln(rise time) / d ln(velocity) = {slope:.2f}")
     measured, predicted = {}, {}
     for row in rows_of("rise_times.csv"):
