@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from markupsafe import Markup
-from matplotlib.colors import ListedColormap
 from numpy.typing import NDArray
 
 from greybed.calibration import Answer, Study
@@ -40,9 +39,7 @@ def band_figure(study: Study, found: Answer, bands: Bands, label: str, unit: str
     """Isolines of one measure, and the band in which it is within its errors."""
     with style():
         figure, axes = new_figure(3.3, 2.9)
-        inside = np.where(bands.pulls[label] < WIDTH, 1.0, np.nan)
-        axes.pcolormesh(bands.x, bands.y, inside, cmap=ListedColormap([GRID]), rasterized=False,
-                        shading="nearest", edgecolors="none")  # fmt: skip
+        axes.contourf(bands.x, bands.y, bands.pulls[label], [-1.0, WIDTH], colors=[GRID])
         if label in bands.values:
             values = bands.values[label]
             if np.ptp(values) > 0.0:
@@ -58,18 +55,15 @@ def overlap_figure(study: Study, found: Answer, bands: Bands) -> Markup:
     """Where how many of the measures fit within their errors."""
     with style():
         figure, axes = new_figure(3.8, 3.2)
-        count = np.sum([pull < WIDTH for pull in bands.pulls.values()], axis=0)
-        total = len(bands.pulls)
+        worst = np.max(list(bands.pulls.values()), axis=0)
         for k, (_, pull) in enumerate(bands.pulls.items()):
             colour = SERIES[k % len(SERIES)]
             axes.contour(
                 bands.x, bands.y, pull, [WIDTH], colors=[colour], linewidths=1.0,
                 linestyles=["-", "--", ":"][k // len(SERIES) % 3],
             )  # fmt: skip
-        every = np.where(count == total, 1.0, np.nan)
-        if np.isfinite(every).any():
-            axes.pcolormesh(bands.x, bands.y, every, cmap=ListedColormap([INK]), alpha=0.55,
-                            shading="nearest", edgecolors="none")  # fmt: skip
+        if worst.min() < WIDTH:
+            axes.contourf(bands.x, bands.y, worst, [-1.0, WIDTH], colors=[INK], alpha=0.55)
         _place(study, bands, axes, found)
         for k, label in enumerate(bands.pulls):
             axes.plot([], [], color=SERIES[k % len(SERIES)], label=_label(label.split(".")[-1]),
