@@ -170,6 +170,13 @@ FILES |= {
     "few.toml": STUDY.format(file="three.csv", model="", viscosity=VISCOSITY),
 }
 DIAGNOSED = ("missing", "typed", "unit", "hole", "thin", "effect", "few")
+# Name, what of the example is changed, and into what.
+CALIBRATED = {
+    "rangeless": ("low = 0.1\n", ""),
+    "reversed": ("low = 0.1\n", "low = 1.1\n"),
+    "errorless": ('value = "65.6 deg"\nsd = "1 deg"', 'value = "65.6 deg"\nsd = 0'),
+    "no_measure": ('measure = "mass_flow"', 'measure = "noise"'),
+}
 COMMANDS = [
     "info missing.csv",
     "info empty.csv",
@@ -200,6 +207,7 @@ COMMANDS = [
     "simulate wrong_unit.toml --out o",
     "simulate too_bright.toml --out o",
     *(f"diagnose {name}.toml --out o" for name in DIAGNOSED),
+    *(f"calibrate {name}.toml --out o" for name in CALIBRATED),
 ]
 FREE = {"radius_over_distance": 0.25, "radius_ratio": 1.0}
 CALLS = {
@@ -245,6 +253,10 @@ def bad_files(tmp_path_factory):
     ):
         assert old in case
         (folder / f"{name}.toml").write_text(case.replace(old, new))
+    study = (ROOT / "examples/calibration/twin.toml").read_text()
+    for name, (old, new) in CALIBRATED.items():
+        assert old in study
+        (folder / f"{name}.toml").write_text(study.replace(old, new, 1))
     return folder
 
 
