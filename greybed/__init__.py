@@ -5,17 +5,10 @@ Importing the package is cheap; ``greybed.Packing``, ``greybed.read_packing``,
 first use.
 """
 
-import os
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
-from greybed._kernel_cache import refresh
 from greybed._version import __version__
-
-# Where Numba is told of another place, what it keeps there is the user's to look after.
-if not os.environ.get("NUMBA_CACHE_DIR"):
-    refresh(Path(__file__).parent)
 
 _NAMES = {
     "Packing": "greybed.core",

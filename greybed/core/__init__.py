@@ -1,5 +1,8 @@
 """What every room shares: packings, walls, errors with remedies, files with provenance."""
 
+import os
+from pathlib import Path
+
 from greybed.core.errors import (
     GreybedError,
     InputError,
@@ -7,8 +10,14 @@ from greybed.core.errors import (
     RangeError,
     VerificationError,
 )
+from greybed.core.kernel_cache import refresh
 from greybed.core.packing import Overlaps, Packing
 from greybed.core.walls import Cone, Cylinder, Disc, Mesh, Plane, Polygon, Wall, box_walls
+
+# Here, for every room comes by before its kernels are called. Where Numba is told of another place,
+# what it keeps there is the user's to look after.
+if not os.environ.get("NUMBA_CACHE_DIR"):
+    refresh(Path(__file__).parents[1])
 
 __all__ = [
     "Cone",

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from greybed._kernel_cache import refresh
+from greybed.core.kernel_cache import refresh
 
 INNER = "from numba import njit\n\n\n@njit(cache=True)\ndef two():\n    return 2.0\n"
 OUTER = (
