@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -32,7 +33,7 @@ _MEASURE = ("unit", "kind", "what", "takes", "source")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Listed:
+class Listed(ABC):
     """Keys of every ``[[experiment]]``."""
 
     name: str
@@ -44,9 +45,9 @@ class Listed:
         None
     )  # of a candidate: measure -> error that it would have
 
+    @abstractmethod
     def experiment(self, folder: Path) -> Experiment:
         """The experiment itself; ``folder`` is where relative paths start."""
-        raise NotImplementedError
 
     def files(self) -> tuple[Path, ...]:
         """Files that it names."""
