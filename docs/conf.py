@@ -28,7 +28,8 @@ autodoc_typehints = "none"  # docstrings state types together with shapes and un
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 napoleon_use_param = False  # else every "shape" in a type becomes a link to some attribute
-napoleon_use_ivar = True
+napoleon_custom_sections = [("Attributes", "params_style")]
+highlight_language = "none"
 # Errors are in greybed.core and in greybed.core.errors; either is right.
 suppress_warnings = ["ref.python"]
 
@@ -54,12 +55,16 @@ def with_navigation(app, docname, source):
     here = (ROOT / docname).parent
     trees = []
     for part in re.split(r"^## ", source[0], flags=re.MULTILINE)[1:]:
-        pages = re.findall(r"^- \[[^\]]+\]\(([^)#]+\.(?:md|rst))\)", part, re.MULTILINE)
-        names = [str((here / page).resolve().relative_to(ROOT).with_suffix("")) for page in pages]
+        entries = [
+            f"{title} </{(here / page).resolve().relative_to(ROOT).with_suffix('')}>"
+            for title, page in re.findall(
+                r"^- \[(.+?)\]\(([^)#]+\.(?:md|rst))\)", part, re.MULTILINE
+            )
+        ]
         caption = part.splitlines()[0]
         trees.append(
             "\n".join(["```{toctree}", ":hidden:", f":caption: {caption}", "",
-                       *("/" + name for name in names), "```"])
+                       *entries, "```"])
         )  # fmt: skip
     source[0] += "\n\n" + "\n\n".join(trees) + "\n"
 

@@ -27,7 +27,8 @@ def measure(picture: Path) -> dict[str, float]:
     """Draw, and give what is compared."""
     study = read_study(STUDY)
     found = diagnose(study)
-    again = diagnose(replace(study, model=found.model))
+    switched = {effect.name: effect.amplitude for effect in found.effects}
+    again = diagnose(replace(study, model=replace(study.model, effects=switched)))
     amplitudes = {effect.name: effect for effect in found.effects}
     figure, axes = plt.subplots(1, 2, figsize=(9, 3.6), layout="constrained")
     error = found.error
