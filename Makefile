@@ -37,7 +37,7 @@ docs: $(VENV)/.installed-docs ## pages and module reference as HTML in build/doc
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -c docs . build/docs
 	@echo open build/docs/index.html
 
-verification: $(STAMP) ## every figure of docs/verification.md anew, pass or fail; ten minutes
+verification: $(STAMP) ## every figure of docs/verification.md anew, pass or fail; six minutes
 	$(BIN)/python examples/verification/run.py
 
 bench: $(STAMP)  ## benchmarks against peers; not part of the tests

@@ -5,7 +5,7 @@
 Spheres of 1.7 to 2.3 mm (radii) fall into a box and come to rest, with greybed and with LIGGGHTS
 (which must be installed), from the same random places for each seed. Writes settled_beds.json and
 settled_beds.png; the recorded ones are examples/verification/results/settled_beds.json and
-docs/images/settled_beds.png. About ten minutes for the defaults on half a core.
+docs/images/settled_beds.png. About two minutes for the defaults.
 """
 
 from __future__ import annotations
