@@ -30,6 +30,7 @@ from greybed.datasets.beds import (
     as_table,
     emitters_of,
 )
+from greybed.datasets.columns import whole_column
 from greybed.datasets.designs import (
     MOST_SEED,
     Design,
@@ -350,6 +351,7 @@ def read(path: str | os.PathLike[str]) -> ViewFactorData:
             exchange = _read_rows(content["exchange"], EXCHANGE_COLUMNS)
             design = json.loads(content.attrs["design"])
             stored = content.attrs["sha256"].decode()
+            tables = design["packing"]
     except InputError:
         raise
     except Exception as error:  # what h5py raises for a damaged file is not documented
@@ -357,7 +359,6 @@ def read(path: str | os.PathLike[str]) -> ViewFactorData:
             f"{file}: cannot read this data set ({shown(str(error), 80)}); copy it or make it "
             "again."
         ) from None
-    tables = design["packing"]
     data = ViewFactorData(
         columns, packing, tables, ViewFactorData(*wall, tables), ViewFactorData(*exchange, tables)
     )
@@ -371,5 +372,8 @@ def read(path: str | os.PathLike[str]) -> ViewFactorData:
 def _read_rows(
     group: h5py.Group, names: tuple[str, ...]
 ) -> tuple[dict[str, Array], NDArray[np.int64]]:
-    columns = {name: group[name][...] for name in names}
-    return columns, group["packing"][...].astype(np.int64)
+    columns = {name: whole_column(group, name, "f") for name in names}
+    packing = whole_column(group, "packing", "i").astype(np.int64)
+    if len({len(packing), *map(len, columns.values())}) != 1:
+        raise ValueError("columns of different lengths")
+    return columns, packing
