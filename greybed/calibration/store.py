@@ -79,8 +79,8 @@ class Store:
             )
         except (sqlite3.Error, UnicodeDecodeError) as error:
             raise OutputError(
-                f"{self.path}: no store of runs ({error}); choose another folder with --out, or "
-                "remove the file."
+                f"{self.path}: no store of runs ({error}); free space, choose another folder "
+                "with --out, or remove the file."
             ) from None
 
     def get(self, key: str) -> Outcome | None:

@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import platform
+import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -61,6 +62,12 @@ def writable_file(path: str | os.PathLike[str]) -> Path:
     return target
 
 
+def reason_of(error: OSError) -> str:
+    """What the system said; the HDF5 library puts it into a page of text."""
+    told = re.search(r"error message = '([^']*)'", str(error))
+    return told[1] if told else (error.strerror or str(error))
+
+
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Give a temporary path beside ``path`` that takes its place only when the block succeeds.
@@ -75,7 +82,7 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         os.replace(temporary, target)
     except OSError as error:
         raise OutputError(
-            f"{target}: cannot write this file ({error.strerror or error}); choose another "
+            f"{target}: cannot write this file ({reason_of(error)}); choose another "
             "folder, free space, or change its permissions."
         ) from None
     finally:
