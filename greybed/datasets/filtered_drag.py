@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from greybed._version import __version__
 from greybed.core.errors import InputError
 from greybed.core.files import atomic_path
+from greybed.core.writers.hdf5_stream import written_hdf5
 from greybed.datasets.columns import whole_column
 
 Array = NDArray[np.float64]
@@ -168,7 +169,7 @@ def _case(table: dict[str, Any]) -> DragCase:
 def write_filtered_drag(path: str | os.PathLike[str], data: FilteredDrag) -> Path:
     """Write a data set, whole or not at all; numbers in single precision."""
     target = Path(path)
-    with atomic_path(target) as temporary, h5py.File(temporary, "w") as file:
+    with atomic_path(target) as temporary, written_hdf5(temporary) as file:
         file.attrs["format"] = FORMAT
         file.attrs["version"] = VERSION
         file.attrs["greybed"] = __version__

@@ -25,6 +25,7 @@ from greybed.core.files import atomic_path, output_folder, writable_file
 from greybed.core.processes import finished, processes
 from greybed.core.progress import progress
 from greybed.core.readers.opening import mapped, shown
+from greybed.core.writers.hdf5_stream import written_hdf5
 from greybed.datasets.beds import (
     Bed,
     as_table,
@@ -305,7 +306,7 @@ def _kept(part: Path) -> dict[str, Array] | None:
 
 def write(data: ViewFactorData, design: Design, path: Path) -> None:
     """Write a data set to HDF5, every column with its unit."""
-    with atomic_path(path) as temporary, h5py.File(temporary, "w", libver="v110") as file:
+    with atomic_path(path) as temporary, written_hdf5(temporary, libver="v110") as file:
         file.attrs["format"] = np.bytes_(FORMAT)
         tables = {"packing": data.packings}
         settings = {"rays": design.rays, "emitters": design.emitters, "seed": design.seed}

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from greybed.core.errors import InputError
 from greybed.core.files import atomic_path
 from greybed.core.packing import Packing
+from greybed.core.writers.hdf5_stream import written_hdf5
 
 # Rows in a chunk of the arrays, which grow by a frame at a time.
 _CHUNK = 4096
@@ -83,9 +84,8 @@ def join_parts(path: str | os.PathLike[str], parts: Sequence[str | os.PathLike[s
     """
     if not parts:
         raise InputError(f"{path}: there is no frame to write; give one at least.")
-    import h5py
 
-    with atomic_path(path) as target, h5py.File(target, "w", libver=("v110", "v110")) as file:
+    with atomic_path(path) as target, written_hdf5(target, libver=("v110", "v110")) as file:
         root = file.create_group("VTKHDF")
         root.attrs["Version"] = np.array([2, 0], dtype=np.int64)
         # A text of fixed length in ASCII: readers of VTK take no other.
