@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from greybed.core import OutputError
-from greybed.core.files import sole_writer
+from greybed.core.folder_lock import sole_writer
 from greybed.report.stages import Stages
 
 DESIGN = "rays = 6000\nemitters = 40\nseed = 4\n" + "".join(
@@ -340,7 +340,7 @@ def test_many_runs_take_a_lock_in_turn(tmp_path):
     code = (
         "import sys, time, pathlib\n"
         "from greybed.core import OutputError\n"
-        "from greybed.core.files import sole_writer\n"
+        "from greybed.core.folder_lock import sole_writer\n"
         "number = pathlib.Path('number')\n"
         "for _ in range(40):\n"
         "    while True:\n"

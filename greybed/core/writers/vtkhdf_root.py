@@ -14,6 +14,7 @@ import numpy as np
 
 from greybed.core.errors import InputError
 from greybed.core.files import atomic_path
+from greybed.core.writers.hdf5_stream import written_hdf5
 
 
 @contextmanager
@@ -29,9 +30,7 @@ def vtkhdf_file(path: str | os.PathLike[str], kind: str, frames: int) -> Iterato
     """
     if not frames:
         raise InputError(f"{path}: there is no frame to write; give one at least.")
-    import h5py
-
-    with atomic_path(path) as target, h5py.File(target, "w", libver=("v110", "v110")) as file:
+    with atomic_path(path) as target, written_hdf5(target, libver=("v110", "v110")) as file:
         root = file.create_group("VTKHDF")
         root.attrs["Version"] = np.array([2, 0], dtype=np.int64)
         # A text of fixed length in ASCII: readers of VTK take no other.
