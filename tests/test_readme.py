@@ -27,7 +27,7 @@ BLOCK = re.compile(
 # Names that a page takes for granted, with what stands for them.
 NAMES = {"docs/formats.md": {"temperatures": [300.0] * 4000}}
 # Verbs of the README's table that the test leaves out, for what they take; see their own tests.
-LONG = {"quickstart", "dataset"}
+LONG = {"quickstart"}
 
 
 @dataclass(frozen=True)
@@ -143,8 +143,9 @@ def test_commands_of_the_verb_table(tmp_path, small_run, small_quickstart):
             lines.append(command)
     done = shell("\n".join(lines), tmp_path)
     assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
-    for made in ("bed.vtu", "bed.h5", "traced/view_factors.h5", "heated_bed/summary.json"):
-        assert (tmp_path / "runs" / made).is_file()
+    made = ("bed.vtu", "bed.h5", "traced/view_factors.h5", "small.h5", "heated_bed/summary.json")
+    for file in made:
+        assert (tmp_path / "runs" / file).is_file()
 
 
 def test_quickstart_of_the_makefile_is_the_one_described():
