@@ -21,7 +21,7 @@ test: $(STAMP)   ## lint, types, import contracts, tests
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest -n 2 --dist worksteal --durations=10
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal --durations=10
 
 lint: $(STAMP)   ## mend what can be mended, show the rest
 	$(BIN)/ruff check --fix .
