@@ -2,7 +2,9 @@
 
 Writes scorecard.json, scorecard.md, sets.csv and summary.json, besides the sets and the answers.
 
-example: greybed blindtest --sets 200 --seed 1 --out runs/blind --competitors
+examples:
+  greybed blindtest --sets 6 --seed 1 --kinds none,one --out runs/blind
+  greybed blindtest --sets 200 --seed 1 --out runs/blind200 --competitors
 """
 
 from __future__ import annotations

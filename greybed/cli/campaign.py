@@ -1,6 +1,7 @@
 """Run a case file with many values: on this machine, a cluster of dask, or jobs of Slurm.
 
 Examples:
+  greybed campaign examples/campaign/campaign.toml --out runs/campaign
   greybed campaign study.toml --out runs/study --workers 2
   greybed campaign study.toml --out runs/study --scheduler local
   greybed campaign study.toml --out runs/study --scheduler tcp://head:8786

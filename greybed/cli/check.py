@@ -1,8 +1,8 @@
 """Check a closure: limiting cases, golden rows, hash, and the ranges it was trained for.
 
 Examples:
-  greybed check bed.closure
   greybed check shipped:viewfactor_mlp_pencil
+  greybed check bed.closure
   greybed check bed.closure --exported cpp,onnx --out runs/check
   greybed check drag.closure                       # filtered drag: fraction kept
 

@@ -1,8 +1,8 @@
 """Make a data set for training: traced packings, or filtered flows of gas and particles.
 
 Examples:
-  greybed dataset viewfactor --out runs/viewfactor.h5
-  greybed dataset viewfactor design.toml --out runs/viewfactor.h5 --workers 2
+  greybed dataset viewfactor examples/viewfactor/small.toml --out runs/small.h5
+  greybed dataset viewfactor --out runs/viewfactor.h5 --workers 2
   greybed dataset drag examples/filtered_drag/small.toml --out runs/drag.h5
   greybed dataset drag examples/filtered_drag/default.toml --out runs/drag.h5 --minutes 60
 

@@ -1,8 +1,8 @@
 """Export a closure to C++ or ONNX, and replay its golden rows there before anything is written.
 
 Examples:
-  greybed export bed.closure --to cpp --out runs/host
-  greybed export bed.closure --to cpp,onnx --name bed_radiation --out runs/host
+  greybed export shipped:viewfactor_mlp_pencil --to cpp,onnx --out runs/host
+  greybed export bed.closure --to cpp --name bed_radiation --out runs/host
   greybed export bed.closure --to cpp,c,fortran,onnx --out runs/host
 
 cpp: NAME.hpp (one header, C++11), NAME_test.cpp, CMakeLists.txt, README.md; c: also NAME_c.h and

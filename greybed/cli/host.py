@@ -1,6 +1,7 @@
 """Put a closure into another engine: generate an adapter, build it there, run it.
 
 Examples:
+  greybed host lammps shipped:filtered_drag_mlp_plain --out runs/lammps
   greybed host lammps shipped:filtered_drag_mlp_plain --out runs/lammps --build --run --ranks 2
   greybed host liggghts shipped:viewfactor_mlp_pencil --out runs/liggghts --build
   greybed host openfoam law:wen-yu --out runs/openfoam --build --run

@@ -1,7 +1,8 @@
 """Describe a packing (spheres, radii, box, walls, overlaps, coordination) or a closure (its card).
 
 Examples:
-  greybed info bed.dump --out runs/bed
+  greybed info greybed/datasets/packings/settled_mono_4k.dump
+  greybed info bed.csv --out runs/bed
   greybed info shipped:viewfactor_mlp_pencil
 """
 

@@ -1,7 +1,7 @@
 """Generate a random packing of spheres at an exact solid fraction, without overlaps.
 
 Examples:
-  greybed pack --count 10000 --fraction 0.55 --sizes mono:1.5mm --out runs/bed.h5
+  greybed pack --count 500 --fraction 0.5 --sizes mono:1.5mm --seed 1 --out runs/bed.h5
   greybed pack --count 4000 --fraction 0.58 --sizes discrete:1mm=0.3,1.5mm=0.35,2mm=0.35 \\
       --container cylinder --container-radius 30mm --seed 7 --out runs/column
 

@@ -1,7 +1,7 @@
 """Ray trace a packing: view factors of every sphere to spheres and walls, each with its error.
 
 Examples:
-  greybed trace greybed/datasets/packings/settled_mono_4k.dump --rays 10000 --out runs/trace
+  greybed trace greybed/datasets/packings/settled_mono_4k.dump --rays 2000 --out runs/traced
   greybed trace bed.csv --wall plane:0,0,0:0,0,1 --wall cylinder:0,0,0:0,0,1:30mm --out runs/trace
   greybed trace bed.csv --wall mesh:oven.stl:mm --wall disc:0,0,0:0,0,1:30mm --out runs/trace
   greybed trace bed.csv --emissivity 0.3,0.8 --out runs/exchange

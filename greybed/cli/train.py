@@ -1,8 +1,9 @@
 """Train a closure from a data set and score it on packings, or cases, that it has not seen.
 
 Examples:
+  greybed train viewfactor runs/small.h5 --model forest --out runs/forest
   greybed train viewfactor runs/viewfactor.h5 --model mlp --out runs
-  greybed train drag runs/filtered_drag.h5 --markers gradient --out runs
+  greybed train drag greybed/datasets/filtered_drag.h5 --markers full --out runs
 
 Writes NAME.closure (one file: weights, markers, ranges, golden rows), NAME.html (errors,
 calibration, learning curve, model card) and summary.json. The exit code is 1 if a limiting case
