@@ -59,8 +59,8 @@ def _text(*place: str, **changes: str) -> str:
 
 def _jobs() -> dict[str, Job]:
     bounce = {"start.csv": EXAMPLES / "campaign" / "start.csv"}
-    particles = _text("particles", "hopper.toml", duration='"0.12 s"')
-    particles = particles.replace("[output]", '[output]\ncheckpoints = "10 ms"')
+    particles = _text("particles", "hopper.toml", duration='"40 ms"')
+    particles = particles.replace("[output]", '[output]\ncheckpoints = "4 ms"')
     gas = _text("flows", "channel.toml", duration='"1 s"')
     gas = gas.replace("[output]", '[output]\ncheckpoints = "50 ms"')
     fluids = _text("flows", "clusters.toml", duration='"60 ms"', cells="[32, 64, 1]")
@@ -193,20 +193,24 @@ def kill(verb: str, kills: int, seed: int, root: Path) -> dict[str, Any]:
         (root / "design.toml").write_text(DESIGN)
         if _started(job.before, root).wait() != 0:
             raise RuntimeError((root / "said.log").read_text())
-    durations = []
-    for name in ("first", "whole"):  # the first one also compiles
-        _set_up(job, root / name)
+    # Always the same folder: the names of files are inputs of a campaign.
+    folder = root / "run"
+    found: list[dict[str, str]] = []
+    duration = 0.0
+    for _ in range(2):  # the first one also compiles
+        _set_up(job, folder)
         begin = time.perf_counter()
-        if _started(job.words, root / name).wait() != 0:
-            raise RuntimeError((root / name / "said.log").read_text())
-        durations.append(time.perf_counter() - begin)
-    wanted, duration = results(root / "whole" / "out"), durations[1]
+        if _started(job.words, folder).wait() != 0:
+            raise RuntimeError((folder / "said.log").read_text())
+        duration = time.perf_counter() - begin
+        found.append(results(folder / "out"))
+        shutil.rmtree(folder)
+    wanted = found[1]
     faults: list[str] = []
-    if results(root / "first" / "out") != wanted:
+    if found[0] != wanted:
         faults.append("two whole runs differ")
     done = chains = 0
     while done < kills:
-        folder = root / f"chain{chains}"
         chains += 1
         _set_up(job, folder)
         while True:
@@ -224,16 +228,17 @@ def kill(verb: str, kills: int, seed: int, root: Path) -> dict[str, Any]:
                         p for p, at in before.items() if p.exists() and p.stat().st_mtime_ns != at
                     ]
                     if again:
-                        faults.append(f"{folder.name}: a finished part was made again: {again[0]}")
+                        faults.append(f"run {chains}: a finished part was made again: {again[0]}")
                     continue
             code = run.wait()
             if code != 0:
                 said = (folder / "said.log").read_text()[-300:]
-                faults.append(f"{folder.name}: ended with {code}: {said}")
+                faults.append(f"run {chains}: ended with {code}: {said}")
             break
-        found = results(folder / "out")
-        if found != wanted:
-            names = [n for n in {*found, *wanted} if found.get(n) != wanted.get(n)]
-            faults.append(f"{folder.name}: other results: {sorted(names)[:5]}")
-        shutil.rmtree(folder, ignore_errors=not faults)
+        got = results(folder / "out")
+        if got != wanted:
+            names = [n for n in {*got, *wanted} if got.get(n) != wanted.get(n)]
+            faults.append(f"run {chains}: other results: {sorted(names)[:5]}")
+            shutil.copytree(folder, root / f"fault{chains}")
+        shutil.rmtree(folder)
     return {"verb": verb, "kills": done, "runs": chains, "seconds": duration, "faults": faults}

@@ -57,6 +57,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--fix", action="append", default=[], metavar="WORDS",
         help="a fix of the plugin for all particles; may be repeated",
     )  # fmt: skip
+    parser.add_argument(
+        "--memory",
+        action="store_true",
+        help="print what memory the run will take, part by part, and refuse what does not fit",
+    )
     parser.add_argument("--quiet", action="store_true", help="no progress bars")
 
 
@@ -83,6 +88,8 @@ def run(options: argparse.Namespace) -> int:
         return run_engine(options)
     if options.engine != "greybed":
         raise InputError(f"--engine {options.engine} is for particles only; leave it out.")
+    if options.memory and kind == "thermal-bed":
+        raise InputError("--memory is for particles and flows only; leave it out.")
     if kind in ("particles", "gas-particles"):
         return run_particles(options, gas=kind == "gas-particles")
     if kind in ("two-fluid", "gas"):

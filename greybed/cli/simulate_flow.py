@@ -21,6 +21,8 @@ def run_flow(options: argparse.Namespace, kind: str) -> int:
     from greybed.core.writers.history import write_history
     from greybed.coupling.flow_run import FlowRun
 
+    if options.memory:
+        tell_memory(options.case, kind)
     case, flow, names = _made(options, kind)
     key = sha256_of(options.case)
     with locked_folder(options.out) as folder:
@@ -74,6 +76,24 @@ def run_flow(options: argparse.Namespace, kind: str) -> int:
     _say(results, found, folder)
     print(f"wrote {summary}")
     return 0
+
+
+def tell_memory(path: Path, kind: str, particles: int = 0) -> None:
+    """Print what memory the grid and particles of a case will take, before they are made."""
+    from math import prod
+
+    from greybed.core.config import read_toml
+    from greybed.core.memory import PER_GAS_CELL, PER_PARTICLE, PER_TWO_FLUID_CELL, check_memory
+
+    cells = read_toml(path).get("grid", {}).get("cells", [0])
+    parts = {}
+    if kind != "particles":
+        each = PER_TWO_FLUID_CELL if kind == "two-fluid" else PER_GAS_CELL
+        parts[f"{prod(cells)} cells"] = each * prod(cells)
+    if particles:
+        parts[f"{particles} particles"] = PER_PARTICLE * particles
+    remedy = "take wider cells, fewer particles, or a larger machine"
+    print("\n".join(check_memory(parts, remedy)))
 
 
 def _made(options: argparse.Namespace, kind: str) -> tuple[Any, Any, tuple[str, ...]]:

@@ -51,6 +51,12 @@ def run_particles(options: argparse.Namespace, *, gas: bool = False) -> int:
             run = kind(case, packings, threads=options.threads)
         except InputError as error:
             raise InputError(f"{options.case}: {error}") from None
+        if options.memory:
+            from greybed.cli.simulate_flow import tell_memory
+
+            # Of streams, only what is there at the start.
+            kind_of_grid = "gas" if gas else "particles"
+            tell_memory(options.case, kind_of_grid, len(run.simulation.radii))
         found = 0
         kept = kept_with(checkpoint)
         if kept is not None and kept.get("key") == key:

@@ -94,6 +94,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="cuda traces on an NVIDIA GPU (needs greybed[gpu])",
     )
     add_exchange_arguments(parser)
+    parser.add_argument(
+        "--memory",
+        action="store_true",
+        help="print what memory the run will take, part by part, and refuse what does not fit",
+    )
     parser.add_argument("--quiet", action="store_true", help="no progress bar")
 
 
@@ -128,6 +133,19 @@ def summarise(packing: Packing, blocks: Sequence[Block], rays: int, seed: int) -
     }
 
 
+def _tell_memory(n: int, options: argparse.Namespace) -> None:
+    from greybed.core.errors import InputError
+    from greybed.core.memory import PER_TRACED_SPHERE, check_memory
+
+    if options.smooth or options.rel_error is not None or options.emissivity is not None:
+        raise InputError(
+            "--memory knows traces in blocks only, not --smooth, --rel-error or --emissivity, "
+            "which hold all factors at once; leave it out."
+        )
+    parts = {f"{n} spheres": PER_TRACED_SPHERE * n * (options.workers or 1)}
+    print("\n".join(check_memory(parts, "trace a part of the bed, or take a larger machine")))
+
+
 def run(options: argparse.Namespace) -> int:
     """Trace the packing and write its view factors and their summary."""
     from greybed.core.errors import InputError
@@ -155,6 +173,8 @@ def run(options: argparse.Namespace) -> int:
         limit = parse_quantity(options.max_distance, "length", "--max-distance")
     packing = read_packing(options.file, walls, frame=options.frame, unit=options.length_unit)
     n = len(packing)
+    if options.memory:
+        _tell_memory(n, options)
     with locked_folder(options.out) as folder:
         path = folder / FILE
         if options.emissivity is not None:
