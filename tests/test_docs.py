@@ -57,8 +57,9 @@ def test_links_lead_somewhere(page):
 
 def test_every_page_is_in_the_index():
     index = (ROOT / "docs/index.md").read_text()
-    for page in ROOT.glob("docs/*.md"):
-        assert page.name == "index.md" or f"({page.name})" in index, page.name
+    for page in (*ROOT.glob("docs/*.md"), *ROOT.glob("docs/tutorials/*.md")):
+        name = str(page.relative_to(ROOT / "docs"))
+        assert name == "index.md" or f"({name})" in index, name
 
 
 def exported() -> list[tuple[str, object]]:
