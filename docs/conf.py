@@ -17,7 +17,7 @@ release = version = __version__
 root_doc = "docs/index"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 include_patterns = ["*.md", "docs/**.md", "docs/**.rst", "examples/**/README.md"]
-exclude_patterns = [".venv", "build", "runs", "shared", "greybed", "tests", "benchmarks"]
+exclude_patterns = [".venv", "build", "runs", "greybed", "tests", "benchmarks"]
 myst_heading_anchors = 4
 html_theme = "furo"
 html_title = f"greybed {__version__}"

@@ -115,7 +115,9 @@ def run(options: argparse.Namespace) -> int:
         inputs = [options.case, case.packing.file]
         inputs += [wall.file for wall in case.wall if isinstance(wall, MeshTable)]
         if case.radiation.closure is not None:
-            inputs.append(case.radiation.closure)
+            from greybed.closures import model_path
+
+            inputs.append(model_path(case.radiation.closure))  # also of shipped:NAME
         _write_temperatures(folder / "temperatures.csv", packing, result.temperatures)
         write_packing(packing, folder / "bed.vtu", fields={"temperature [K]": result.temperatures})
         if transient:
