@@ -147,7 +147,8 @@ def forest_tables(forest: Forest) -> list[Table]:
         Table("roots", "std::int32_t", forest.roots),
         Table("feature", "std::int8_t", forest.feature),
         Table("threshold", "float", threshold.astype(np.float32)),
-        Table("following", "std::int32_t", following.astype(np.int32)),
+        # As bytes, lowest first: compilers read strings several times faster than numbers.
+        Table("following", "std::int8_t", following.astype("<i4").view(np.int8)),
         doubles("leaf_values", forest.value[leaf]),
     ]
 

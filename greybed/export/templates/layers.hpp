@@ -159,12 +159,7 @@ struct Layer<IN, WIDTH, 0> {
 /// once: none waits for the others.
 template <int N, class Bend, bool SLOPES>
 struct Bending {
-  typedef typename Choice<(N >= 8), v8, v4>::type Few;
-#if defined(GREYBED_WIDE)
-  typedef typename Choice<(N >= 16), Two<v8>, Few>::type Lanes;
-#else
-  typedef Few Lanes;
-#endif
+  typedef typename Choice<(N >= 8), v8, v4>::type Lanes;
   static constexpr int NOW = sizeof(Lanes) / sizeof(double);
 
   static GREYBED_HOT void run(double* x, double* slope) {
