@@ -1,8 +1,8 @@
 """Check a closure: limiting cases, golden rows, hash, and the ranges it was trained for.
 
 Examples:
-  greybed check bed.closure
   greybed check shipped:viewfactor_mlp_pencil
+  greybed check bed.closure
   greybed check bed.closure --exported cpp,onnx --out runs/check
   greybed check drag.closure                       # filtered drag: fraction kept
   greybed check bed.closure --against runs/trace --bed bed.csv --wall plane:0,0,0:0,0,1
@@ -121,6 +121,7 @@ def run(options: argparse.Namespace) -> int:
     from greybed.closures.viewfactor.limits import check_limits
     from greybed.core import VerificationError
     from greybed.core.files import output_folder, write_summary
+    from greybed.core.folder_lock import locked_folder
 
     refuse_without_trace(options)  # before the work
     out = output_folder(options.out) if options.out else None
@@ -164,6 +165,7 @@ def run(options: argparse.Namespace) -> int:
         print(against_text(results["against"]))
     results["passed"] = passed
     if out is not None:
-        print(f"wrote {write_summary(out, 'check', results, file)}")
+        with locked_folder(out):
+            print(f"wrote {write_summary(out, 'check', results, file)}")
     print("all hold" if passed else "a check FAILED")
     return 0 if passed else 1
