@@ -3,7 +3,7 @@
 Writes scorecard.json, scorecard.md, sets.csv and summary.json, besides the sets and the answers.
 
 examples:
-  greybed blindtest --sets 6 --seed 1 --kinds none,one --out runs/blind
+  greybed blindtest --sets 4 --seed 1 --kinds none,one --out runs/blind
   greybed blindtest --sets 200 --seed 1 --out runs/blind200 --competitors
 """
 
