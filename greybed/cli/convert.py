@@ -1,7 +1,7 @@
 """Convert a packing: dump, CSV, HDF5 or legacy VTK in; CSV, HDF5, VTU or a mesh out.
 
 Examples:
-  greybed convert greybed/datasets/packings/settled_mono_4k.dump bed.vtu
+  greybed convert greybed/datasets/packings/settled_mono_4k.dump runs/bed.vtu
   greybed convert bed.dump bed.vtu --length-unit mm
 """
 
@@ -26,6 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Read, write, and say what the new file does not hold."""
     from greybed.core.errors import InputError
+    from greybed.core.files import output_folder
     from greybed.core.writers import keeps_surroundings, write_packing
 
     out = Path(options.out)
@@ -33,6 +34,7 @@ def run(options: argparse.Namespace) -> int:
     if out.exists() and Path(options.file).exists() and out.samefile(options.file):
         raise InputError(f"{out}: this is the input file itself; choose another name.")
     packing = read_input(options)
+    output_folder(out.parent)
     write_packing(packing, out)
     print(f"wrote {out}: {len(packing)} spheres, in metres")
     lost = [
