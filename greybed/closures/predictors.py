@@ -165,7 +165,7 @@ class Forest:
             and len(self.roots) > 0
             and ((self.roots >= 0) & (self.roots < nodes)).all()
             and (self.left[inner] > np.flatnonzero(inner)).all()
-            and (self.left[inner] + 1 < nodes).all()
+            and (self.left[inner] < nodes - 1).all()  # a sum could pass the largest integer
         )
         if not sound:
             raise InputError("the forest's arrays do not form trees; train or copy it again.")

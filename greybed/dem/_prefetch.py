@@ -1,13 +1,12 @@
 """Tell the processor which rows of an array come next, where no pattern foretells it."""
 
 from llvmlite import ir
-from numba import types
+from numba import config, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
 
-@intrinsic
-def prefetch(typing, array, index):
+def _prefetch(typing, array, index):
     """Bring ``array[index]``, flat, near to the processor; has no other effect."""
 
     def emit(context, builder, signature, arguments):
@@ -22,3 +21,10 @@ def prefetch(typing, array, index):
         return context.get_dummy_value()
 
     return types.void(array, index), emit
+
+
+def _nothing(array, index):
+    """Stands in where kernels are plain Python, as to find a fault in them."""
+
+
+prefetch = _nothing if config.DISABLE_JIT else intrinsic(_prefetch)

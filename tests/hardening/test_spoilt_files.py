@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hardening import fuzz_one
 from hardening_targets import TARGETS
 
+from greybed.closures.predictors import Forest
 from greybed.core.config import LARGEST, read_toml
 from greybed.core.errors import InputError
 
@@ -53,3 +55,11 @@ def test_a_message_stays_one_line_of_bounded_length():
     assert said.startswith("a bx")
     assert said.endswith("the remedy.")
     assert "\n" not in said
+
+
+def test_a_tree_whose_child_is_the_largest_integer():
+    """Its right child would be a negative number: a read before the array."""
+    left = np.array([2**31 - 1, 0, 0], np.int32)
+    feature, zeros = np.array([0, -1, -1], np.int32), np.zeros(3, np.float32)
+    with pytest.raises(InputError, match="do not form trees"):
+        Forest(np.zeros(1, np.int32), feature, zeros, left, np.zeros((3, 2)))
