@@ -3,10 +3,14 @@
 Larger runs with their numbers are in examples/papers.
 """
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from greybed.calibration.experiments import LIBRARY
+from greybed.core.config import build
+from greybed.dem.case import ParticleCase
 
 # Table 1 of paper 000.
 RECYCLATE = {
@@ -37,18 +41,15 @@ def test_paper_000_tetrapods_arch_where_stickier_spheres_do_not():
     assert spheres["mass_share"] > 0.07 / 0.345
 
 
-def test_paper_000_cohesive_beds_are_looser_and_walls_hide_conductivity():
-    bed = {}
-    for cohesion in (0.0, 3.1e5):
-        box = LIBRARY["heated-box"](
-            name="box", count=110, width=4.0, stress_ratio=1e-4, conductivity=20.0,
-            cohesion=cohesion, **RECYCLATE,
-        )  # fmt: skip
-        bed[cohesion] = box.run({}, 1)
-    assert bed[3.1e5]["solid_fraction"] < bed[0.0]["solid_fraction"]
-    for found in bed.values():
-        # The resistance between bed and walls counts as the bed's where walls tell the gradient.
-        assert 0.0 < found["wall_conductivity"] < found["conductivity"] < 20.0
+def test_paper_000_walls_hide_conductivity():
+    box = LIBRARY["heated-box"](
+        name="box", count=100, width=4.0, stress_ratio=1e-3, conductivity=4.0, cohesion=3.1e5,
+        **RECYCLATE | {"time_step": 2e-5},
+    )  # fmt: skip
+    found = box.run({}, 1)
+    # The resistance between bed and walls counts as the bed's where walls tell the gradient.
+    assert 0.0 < found["wall_conductivity"] < 0.97 * found["conductivity"]
+    assert found["conductivity"] < 0.5 * 4.0
 
 
 def test_paper_003_heaps_are_higher_with_more_friction():
@@ -74,11 +75,6 @@ def test_paper_003_heaps_are_higher_with_more_friction():
 )
 def test_shapes_go_into_boxes_and_tubes(shape, volume):
     """Mass of the grains, and vessels that grow with them."""
-    from pathlib import Path
-
-    from greybed.core.config import build
-    from greybed.dem.case import ParticleCase
-
     for kind in ("draw-down-box", "drop", "hopper"):
         test = LIBRARY[kind](name=kind, shape=shape, radius=2e-3, length=1.9)
         assert test.solid == pytest.approx(volume * 8e-9)
