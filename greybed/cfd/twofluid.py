@@ -23,6 +23,7 @@ from greybed.cfd.twofluid_step import (
     State,
     StepError,
     Stepper,
+    not_finite,
 )
 from greybed.core.errors import InputError, RangeError
 
@@ -196,7 +197,8 @@ class TwoFluid:
         if dt is None:
             dt = min(st.longest_step(state, self.courant), self.longest_step)
             if not math.isfinite(dt):
-                raise StepError("two-fluid: nothing moves and no longest_step is given.")
+                why = not_finite(state, self._rims) or " Nothing moves, give longest_step."
+                raise StepError(f"two-fluid: there is no length for a step.{why}")
         if longest is not None:
             dt = min(dt, longest)
         reason = ""
@@ -212,6 +214,7 @@ class TwoFluid:
             return dt
         raise StepError(
             f"two-fluid: the step at {state.time:.6g} s fails even with {2 * dt:.3g} s: {reason}"
+            f"{not_finite(state, self._rims) or not_finite(self._spare, self._rims)}"
         )
 
     def _advance(self, dt: float, gammas: list[Array]) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from greybed.cfd import _kinetic, _twofluid
+from greybed.cfd.grid import AXES
 from greybed.cfd.kinetic import Granular
 from greybed.cfd.poisson import Poisson
 from greybed.cfd.rims import Inflow, Outlet, Rims, Wall
@@ -38,6 +39,22 @@ class State:
     time: float = 0.0
     steps: int = 0
     dt: float = 0.0
+
+
+def not_finite(state: State, rims: Rims) -> str:
+    """The first number of a state that is none, and its place, for a message; or nothing."""
+    parts: list[tuple[str, Array, int | None]] = [
+        ("solid fraction", state.phi, None), ("pressure", state.p, None),
+    ]  # fmt: skip
+    for name, flat in (("solids velocity", state.us), ("gas velocity", state.ug)):
+        parts += [(f"{name} along {AXES[a]}", flat[a], a) for a in rims.axes]
+    for name, flat_one, face in parts:
+        good = np.isfinite(rims.inside(flat_one, face))
+        if not good.all():
+            z, y, x = np.unravel_index(int(np.argmin(good)), good.shape)
+            what = "cell" if face is None else "face"
+            return f" The {name} at {what} ({x}, {y}, {z}) is not finite."
+    return ""
 
 
 @dataclass(frozen=True)

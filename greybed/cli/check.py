@@ -1,19 +1,28 @@
 """Check a closure: limiting cases, golden rows, hash, and the ranges it was trained for.
 
 Examples:
-  greybed check bed.closure
   greybed check shipped:viewfactor_mlp_pencil
+  greybed check bed.closure
   greybed check bed.closure --exported cpp,onnx --out runs/check
   greybed check drag.closure                       # filtered drag: fraction kept
+  greybed check bed.closure --against runs/trace --bed bed.csv --wall plane:0,0,0:0,0,1
 
---exported runs the same limiting cases on the compiled C++ header and on the ONNX graph. The exit
-code is 0 if all hold, 1 if one fails, 2 if the file cannot be used.
+--exported runs the same limiting cases on the compiled C++ header and on the ONNX graph. --against
+says how far the closure is from the traced factors of a bed, without a bound. The exit code is 0 if
+all hold, 1 if one fails, 2 if the file cannot be used.
 """
 
 from __future__ import annotations
 
 import argparse
 from typing import TYPE_CHECKING, Any
+
+from greybed.cli.check_against import (
+    add_against_arguments,
+    against,
+    against_text,
+    refuse_without_trace,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -43,6 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="also check its exported forms: cpp, onnx, or cpp,onnx",
     )
     parser.add_argument("--out", metavar="DIR", help="also write DIR/summary.json")
+    add_against_arguments(parser)
 
 
 def _table(cases: list[LimitCase]) -> str:
@@ -111,7 +121,9 @@ def run(options: argparse.Namespace) -> int:
     from greybed.closures.viewfactor.limits import check_limits
     from greybed.core import VerificationError
     from greybed.core.files import output_folder, write_summary
+    from greybed.core.folder_lock import locked_folder
 
+    refuse_without_trace(options)  # before the work
     out = output_folder(options.out) if options.out else None
     file = model_path(options.model)
     try:
@@ -148,8 +160,12 @@ def run(options: argparse.Namespace) -> int:
         )
         passed = passed and rows["passed"] and all(case.passed for case in found["cases"])
         results["exported"][target] = {"limiting_cases": _plain(found["cases"]), **rows}
+    if options.against is not None:
+        results["against"] = against(options, closure)
+        print(against_text(results["against"]))
     results["passed"] = passed
     if out is not None:
-        print(f"wrote {write_summary(out, 'check', results, file)}")
+        with locked_folder(out):
+            print(f"wrote {write_summary(out, 'check', results, file)}")
     print("all hold" if passed else "a check FAILED")
     return 0 if passed else 1

@@ -43,8 +43,14 @@ class GasFrames(Frames):
             )
         for part in parts:
             part.unlink()
-        name, limits = "void fraction [-]", (0.35, 1.0)
-        field_picture(
-            target / "final_gas.png", self.run.gas_fields()[name], grid.lower, grid.upper, name,
-            limits, f"{self.run.simulation.time:.3f} s",
-        )  # fmt: skip
+        pictures: dict[str, tuple[str, tuple[float, float] | None]] = {
+            "final_gas": ("void fraction [-]", (0.35, 1.0))
+        }
+        fields = self.run.gas_fields()
+        if "temperature [K]" in fields:
+            pictures["final_gas_temperature"] = ("temperature [K]", None)
+        for picture, (name, limits) in pictures.items():
+            field_picture(
+                target / f"{picture}.png", fields[name], grid.lower, grid.upper, name, limits,
+                f"{self.run.simulation.time:.3f} s",
+            )  # fmt: skip

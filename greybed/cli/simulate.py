@@ -28,7 +28,8 @@ from greybed.cli.simulate_flow import run_flow
 from greybed.cli.simulate_particles import run_particles
 from greybed.core.config import read_toml
 from greybed.core.errors import InputError
-from greybed.core.files import atomic_path, output_folder, write_summary
+from greybed.core.files import atomic_path, write_summary
+from greybed.core.folder_lock import locked_folder
 from greybed.core.packing import Packing
 from greybed.core.progress import progress
 
@@ -56,6 +57,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--fix", action="append", default=[], metavar="WORDS",
         help="a fix of the plugin for all particles; may be repeated",
     )  # fmt: skip
+    parser.add_argument(
+        "--memory",
+        action="store_true",
+        help="print what memory the run will take, part by part, and refuse what does not fit",
+    )
     parser.add_argument("--quiet", action="store_true", help="no progress bars")
 
 
@@ -82,6 +88,8 @@ def run(options: argparse.Namespace) -> int:
         return run_engine(options)
     if options.engine != "greybed":
         raise InputError(f"--engine {options.engine} is for particles only; leave it out.")
+    if options.memory and kind == "thermal-bed":
+        raise InputError("--memory is for particles and flows only; leave it out.")
     if kind in ("particles", "gas-particles"):
         return run_particles(options, gas=kind == "gas-particles")
     if kind in ("two-fluid", "gas"):
@@ -89,32 +97,34 @@ def run(options: argparse.Namespace) -> int:
     if options.movie:
         raise InputError("--movie is for particles and flows only; leave it out.")
     case = load_case(options.case)
-    folder = output_folder(options.out)
-    packing = read_packing(case.packing.file, walls=case.walls)
-    show = not options.quiet
-    rows = view_factors(case, packing, threads=options.threads, show=show)
-    transient = case.solve.mode == "transient"
-    with progress(TICKS, "heating", show=show and transient) as advance:
-        done = 0.0
+    with locked_folder(options.out) as folder:
+        packing = read_packing(case.packing.file, walls=case.walls)
+        show = not options.quiet
+        rows = view_factors(case, packing, threads=options.threads, show=show)
+        transient = case.solve.mode == "transient"
+        with progress(TICKS, "heating", show=show and transient) as advance:
+            done = 0.0
 
-        def on_progress(fraction: float) -> None:
-            nonlocal done
-            before, done = done, done + fraction
-            advance(round(done * TICKS) - round(before * TICKS))
+            def on_progress(fraction: float) -> None:
+                nonlocal done
+                before, done = done, done + fraction
+                advance(round(done * TICKS) - round(before * TICKS))
 
-        bed, result = run_case(case, packing, rows, on_progress=on_progress)
+            bed, result = run_case(case, packing, rows, on_progress=on_progress)
 
-    inputs = [options.case, case.packing.file]
-    inputs += [wall.file for wall in case.wall if isinstance(wall, MeshTable)]
-    if case.radiation.closure is not None:
-        inputs.append(case.radiation.closure)
-    _write_temperatures(folder / "temperatures.csv", packing, result.temperatures)
-    write_packing(packing, folder / "bed.vtu", fields={"temperature [K]": result.temperatures})
-    if transient:
-        names = [w.name for w in case.wall]
-        _write_history(folder / "history.csv", result.history, names)
-    results = summary(case, bed, result)
-    write_summary(folder, "simulate", results, *inputs, seed=case.radiation.seed)
+        inputs = [options.case, case.packing.file]
+        inputs += [wall.file for wall in case.wall if isinstance(wall, MeshTable)]
+        if case.radiation.closure is not None:
+            from greybed.closures import model_path
+
+            inputs.append(model_path(case.radiation.closure))  # also of shipped:NAME
+        _write_temperatures(folder / "temperatures.csv", packing, result.temperatures)
+        write_packing(packing, folder / "bed.vtu", fields={"temperature [K]": result.temperatures})
+        if transient:
+            names = [w.name for w in case.wall]
+            _write_history(folder / "history.csv", result.history, names)
+        results = summary(case, bed, result)
+        write_summary(folder, "simulate", results, *inputs, seed=case.radiation.seed)
 
     print(f"{len(packing)} spheres, {results['status']}")
     t = result.temperatures

@@ -15,16 +15,18 @@ TICKS = 1000  # of the progress bar
 
 def run_flow(options: argparse.Namespace, kind: str) -> int:
     """Run the case of the kind ``two-fluid`` or ``gas`` that ``options`` name; returns 0."""
-    from greybed.core.files import output_folder, sha256_of, sole_writer, write_summary
+    from greybed.core.files import sha256_of, write_summary
+    from greybed.core.folder_lock import locked_folder
     from greybed.core.progress import progress
     from greybed.core.writers.history import write_history
     from greybed.coupling.flow_run import FlowRun
 
+    if options.memory:
+        tell_memory(options.case, kind)
     case, flow, names = _made(options, kind)
     key = sha256_of(options.case)
-    folder = output_folder(options.out)
-    checkpoint = folder / CHECKPOINT
-    with sole_writer(folder / ".simulate.lock"):
+    with locked_folder(options.out) as folder:
+        checkpoint = folder / CHECKPOINT
         run = FlowRun(case, flow)
         found = flow.steps if run.restore(checkpoint, key) else 0
         frames = _Frames(run, folder, options.movie, names[0])
@@ -74,6 +76,24 @@ def run_flow(options: argparse.Namespace, kind: str) -> int:
     _say(results, found, folder)
     print(f"wrote {summary}")
     return 0
+
+
+def tell_memory(path: Path, kind: str, particles: int = 0) -> None:
+    """Print what memory the grid and particles of a case will take, before they are made."""
+    from math import prod
+
+    from greybed.core.config import read_toml
+    from greybed.core.memory import PER_GAS_CELL, PER_PARTICLE, PER_TWO_FLUID_CELL, check_memory
+
+    cells = read_toml(path).get("grid", {}).get("cells", [0])
+    parts = {}
+    if kind != "particles":
+        each = PER_TWO_FLUID_CELL if kind == "two-fluid" else PER_GAS_CELL
+        parts[f"{prod(cells)} cells"] = each * prod(cells)
+    if particles:
+        parts[f"{particles} particles"] = PER_PARTICLE * particles
+    remedy = "take wider cells, fewer particles, or a larger machine"
+    print("\n".join(check_memory(parts, remedy)))
 
 
 def _made(options: argparse.Namespace, kind: str) -> tuple[Any, Any, tuple[str, ...]]:

@@ -28,7 +28,10 @@ from greybed.dem.simulation import Simulation
 Array = NDArray[np.float64]
 
 # What is added up over a run.
-_SUMS = ("gas steps", "pressure iterations", "lower limit of void fraction reached")
+_FROM_GAS, _LIGHT = "heat from the gas [J]", "heat by radiation from walls and opening [J]"
+_SUMS = (
+    "gas steps", "pressure iterations", "lower limit of void fraction reached", _FROM_GAS, _LIGHT,
+)  # fmt: skip
 
 
 class GasParticlesRun(ParticleRun):
@@ -151,7 +154,10 @@ class GasParticlesRun(ParticleRun):
             self.worst["divergence"] = max(self.worst["divergence"], left_over)
             self.worst["momentum"] = max(self.worst["momentum"], report.defect)
             if self.coupled.heat is not None and self.coupled.heat.report is not None:
-                self.worst["energy"] = max(self.worst["energy"], self.coupled.heat.report.defect)
+                warm = self.coupled.heat.report
+                self.worst["energy"] = max(self.worst["energy"], warm.defect)
+                self.totals[_FROM_GAS] += warm.from_gas
+                self.totals[_LIGHT] += warm.from_surroundings
 
     def _warm(self) -> None:
         """Heat through contacts goes with the gas's steps, if at all."""
@@ -180,6 +186,8 @@ class GasParticlesRun(ParticleRun):
             row |= {f"force {name} of the gas [N]": 0.0 for name in "xyz"}
         if self.case.gas_heat is not None:
             row["mean gas temperature [K]"] = float(self.gas.temperature.mean())
+            # With what walls give through contacts, this is all that the particles gain.
+            row |= {name: self.totals[name] for name in (_FROM_GAS, _LIGHT)}
         return row
 
     def _note(self) -> None:
@@ -216,7 +224,11 @@ class GasParticlesRun(ParticleRun):
                     if self.case.gas_heat is not None
                     else {}
                 ),
-                **{k: v for k, v in self._gas_sample().items() if k.startswith("pressure drop")},
+                **{
+                    k: v
+                    for k, v in self._gas_sample().items()
+                    if k.startswith(("pressure drop", "heat"))
+                },
             }
         }
 
@@ -234,6 +246,8 @@ class GasParticlesRun(ParticleRun):
         if "gas_sums" not in beside:
             raise InputError("this checkpoint holds no gas; give the case that wrote it.")
         sums = beside["gas_sums"].tolist()
+        if len(sums) != len(self.totals) + len(self.worst):
+            raise InputError("this checkpoint is of another version; remove it, and run again.")
         self.totals = dict(zip(self.totals, sums, strict=False))
         self.worst = dict(zip(self.worst, sums[len(self.totals) :], strict=True))
         self.gas.restore({n.removeprefix("gas_"): a for n, a in beside.items() if n[:4] == "gas_"})

@@ -305,7 +305,13 @@ def newton(
             if left > tolerance * exchanged:
                 reason = "converged to round-off"
             return state, Status(True, reason, "", iteration, relative), history
-        if not np.isfinite(left) or iteration == max_iterations:
+        if not np.isfinite(left):
+            sphere = int(np.argmin(np.isfinite(heat) & np.isfinite(light)))
+            at = f"its temperature is {state.temperatures[sphere]:g} K"
+            reason = f"the heat of sphere {sphere} is not finite ({at})"
+            remedy = "look at its conductances, its source and what it sees"
+            return state, Status(False, reason, remedy, iteration, relative), history
+        if iteration == max_iterations:
             break
         t = state.temperatures
         step, light_step, ok = network.solve(t, rate, heat, light, rtol=1e-5)

@@ -1,4 +1,8 @@
-"""Compiled contact laws, each a loop over a batch of contacts that the compiler can vectorise."""
+"""Compiled contact laws, each a loop over a batch of contacts that the compiler can vectorise.
+
+``work`` is the batch: row ``col.NX`` holds one number for each of its contacts c, the first n of
+which are filled. What each row is stands in ``_columns.py``.
+"""
 
 import math
 
@@ -13,7 +17,7 @@ _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
 @njit(**_OPTIONS)
-def room(table):
+def empty_batch(table):
     """A batch before its first contact; with one pair of materials its numbers stay in there."""
     work = np.empty((col.ROWS, col.SIZE))
     if table.shape[0] == 1:
@@ -159,7 +163,10 @@ def surface_velocity(work, n):
 
 @njit(**_OPTIONS)
 def hertz(work, n):
-    """Hertz's force with Tsuji's damping; Mindlin's tangential stiffness without slip."""
+    """Hertz's force with Tsuji's damping; Mindlin's tangential stiffness without slip.
+
+    ``stiff`` is S = 2 E* sqrt(R* d), ``critical`` the dashpot of critical damping, 2 sqrt(S m*).
+    """
     r_eff, overlap, modulus, k_t, shear, k_n = (
         work[col.R_EFF],
         work[col.OVERLAP],
@@ -168,22 +175,22 @@ def hertz(work, n):
         work[col.LAW_SHEAR],
         work[col.K_N],
     )
-    force, damping, m_eff, un, viscous, sideways = (
+    force, damping, m_eff, un, dashpot_t, tangential = (
         work[col.FORCE],
         work[col.LAW_DAMPING],
         work[col.M_EFF],
         work[col.UN],
-        work[col.DRAG],
-        work[col.LAW_SIDEWAYS],
+        work[col.DASHPOT],
+        work[col.LAW_TANGENTIAL],
     )
     for c in range(n):
         width = math.sqrt(r_eff[c] * overlap[c])
         stiff = 2.0 * modulus[c] * width
         k_t[c] = 8.0 * shear[c] * width
         k_n[c] = stiff * (2.0 / 3.0)
-        root = 2.0 * math.sqrt(stiff * m_eff[c])
-        force[c] = k_n[c] * overlap[c] - damping[c] * root * un[c]
-        viscous[c] = sideways[c] * root
+        critical = 2.0 * math.sqrt(stiff * m_eff[c])
+        force[c] = k_n[c] * overlap[c] - damping[c] * critical * un[c]
+        dashpot_t[c] = tangential[c] * critical
 
 
 @njit(**_OPTIONS)
@@ -198,13 +205,13 @@ def viscoelastic(work, n):
         work[col.K_N],
         work[col.LAW_UNLOADING],
     )
-    force, damping, m_eff, un, viscous, sideways = (
+    force, damping, m_eff, un, dashpot_t, tangential = (
         work[col.FORCE],
         work[col.LAW_DAMPING],
         work[col.M_EFF],
         work[col.UN],
-        work[col.DRAG],
-        work[col.LAW_SIDEWAYS],
+        work[col.DASHPOT],
+        work[col.LAW_TANGENTIAL],
     )
     for c in range(n):
         width = math.sqrt(r_eff[c] * overlap[c])
@@ -212,10 +219,10 @@ def viscoelastic(work, n):
         k_t[c] = 8.0 * shear[c] * width
         k_n[c] = stiff * (2.0 / 3.0)
         # The force of Hertz is 2/3 S d, so 3/2 A k sqrt(d) is A times S.
-        root = 2.0 * math.sqrt(stiff * m_eff[c])
-        drag = damping[c] * root + relaxation[c] * stiff
+        critical = 2.0 * math.sqrt(stiff * m_eff[c])
+        drag = damping[c] * critical + relaxation[c] * stiff
         force[c] = k_n[c] * overlap[c] - drag * un[c]
-        viscous[c] = sideways[c] * root
+        dashpot_t[c] = tangential[c] * critical
 
 
 @njit(**_OPTIONS)
@@ -229,18 +236,18 @@ def linear(work, n):
         work[col.FORCE],
         work[col.OVERLAP],
     )
-    damping, m_eff, un, viscous, sideways = (
+    damping, m_eff, un, dashpot_t, tangential = (
         work[col.LAW_DAMPING],
         work[col.M_EFF],
         work[col.UN],
-        work[col.DRAG],
-        work[col.LAW_SIDEWAYS],
+        work[col.DASHPOT],
+        work[col.LAW_TANGENTIAL],
     )
     for c in range(n):
         k_n[c], k_t[c] = modulus[c], shear[c]
         force[c] = modulus[c] * overlap[c]
         force[c] -= 2.0 * damping[c] * math.sqrt(modulus[c] * m_eff[c]) * un[c]
-        viscous[c] = 2.0 * sideways[c] * math.sqrt(shear[c] * m_eff[c])
+        dashpot_t[c] = 2.0 * tangential[c] * math.sqrt(shear[c] * m_eff[c])
 
 
 @njit(**_OPTIONS)
@@ -254,11 +261,11 @@ def hysteresis(work, n):
         work[col.OVERLAP],
         work[col.LAW_UNLOADING],
     )
-    deep, force, viscous, sideways, m_eff = (
+    deep, force, dashpot_t, tangential, m_eff = (
         work[col.DEEP],
         work[col.FORCE],
-        work[col.DRAG],
-        work[col.LAW_SIDEWAYS],
+        work[col.DASHPOT],
+        work[col.LAW_TANGENTIAL],
         work[col.M_EFF],
     )
     for c in range(n):
@@ -270,7 +277,7 @@ def hysteresis(work, n):
             deep[c] = overlap[c] * (1.0 - 1.0 / ratio[c])
         else:
             force[c] = max(unloading, 0.0)
-        viscous[c] = 2.0 * sideways[c] * math.sqrt(shear[c] * m_eff[c])
+        dashpot_t[c] = 2.0 * tangential[c] * math.sqrt(shear[c] * m_eff[c])
 
 
 @njit(**_OPTIONS)
@@ -310,9 +317,9 @@ def friction(work, n):
         work[col.FORCE],
         work[col.LAW_FRICTION],
     )
-    sliding, viscous, fx, vx, fy, vy = (
+    sliding, dashpot_t, fx, vx, fy, vy = (
         work[col.LAW_SLIDING],
-        work[col.DRAG],
+        work[col.DASHPOT],
         work[col.FX],
         work[col.VX],
         work[col.FY],
@@ -324,7 +331,7 @@ def friction(work, n):
         pressed = abs(force[c] + extra[c])
         slides = held > static[c] * pressed
         share = sliding[c] * pressed / held if slides else 1.0
-        dashpot = 0.0 if slides else viscous[c]
+        dashpot = 0.0 if slides else dashpot_t[c]
         sx[c] *= share
         sy[c] *= share
         sz[c] *= share

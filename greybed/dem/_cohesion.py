@@ -66,13 +66,13 @@ def jkr(work, n, limit):
         work[col.K_T],
         work[col.LAW_SHEAR],
         work[col.FORCE],
-        work[col.DRAG],
+        work[col.DASHPOT],
     )
     damping, m_eff, un, sideways = (
         work[col.LAW_DAMPING],
         work[col.M_EFF],
         work[col.UN],
-        work[col.LAW_SIDEWAYS],
+        work[col.LAW_TANGENTIAL],
     )
     for c in range(n):
         pull = math.sqrt(math.pi * gamma[c] / modulus[c])

@@ -30,12 +30,15 @@ APART, TOUCH, BRIDGE = 0, 1, 2
 SIZE = 96
 # Rows of a batch: the columns of the table, then one number of each contact [SI]. The first body
 # feels the force, N points to it from the second, U is its velocity relative to the second without
-# spin, V that of the surfaces in contact, along them.
-LAW_MODULUS, LAW_SHEAR, LAW_DAMPING, LAW_SIDEWAYS, LAW_FRICTION, LAW_SLIDING = range(6)
+# spin, V that of the surfaces in contact, along them; I and J are the spins of the two, UN is U
+# along N. FORCE is along N, K_N and K_T are stiffnesses and DASHPOT [N s/m] is the tangential one.
+# S is the tangential spring, T that of rolling, DEEP the plastic overlap. F is the whole force, B
+# is N x its tangential part, R the rolling torque.
+LAW_MODULUS, LAW_SHEAR, LAW_DAMPING, LAW_TANGENTIAL, LAW_FRICTION, LAW_SLIDING = range(6)
 LAW_ROLLING, LAW_ROLLING_DAMPING, LAW_COHESION, LAW_UNLOADING, LAW_NEAREST = range(6, 11)
 NX, NY, NZ, OVERLAP, R_EFF, M_EFF, INERTIA, ARM_I, ARM_J, AREA = range(12, 22)
 UX, UY, UZ, IX, IY, IZ, JX, JY, JZ = range(22, 31)
-UN, VX, VY, VZ, FORCE, K_N, K_T, DRAG = range(31, 39)
+UN, VX, VY, VZ, FORCE, K_N, K_T, DASHPOT = range(31, 39)
 SX, SY, SZ, TX, TY, TZ, DEEP = range(39, 46)
 FX, FY, FZ, BX, BY, BZ, RX, RY, RZ = range(46, 55)
 RI, RJ, MI, MJ = range(55, 59)

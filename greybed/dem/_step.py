@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit, prange
 
-from greybed.dem._batch import room
+from greybed.dem._batch import empty_batch
 from greybed.dem._pairs import block_forces
 from greybed.dem._rigid import kick_bodies
 from greybed.dem._walls import move, wall_forces
@@ -160,7 +160,7 @@ def _kicks(state, near, rigid, push, edge, dt, finish, start, worst):
 @njit(**_OPTIONS)
 def _forces_of_block(b, state, near, surfaces, law, edge, periodic, dt, look, deepest):
     begin, end = near.block[b], near.block[b + 1]
-    work = room(law.table)
+    work = empty_batch(law.table)
     block_forces(
         begin, end, state.place, state.motion, state.load, state.kind,
         near.first, near.owner, near.partner, near.shift, near.touch, near.history, near.slot,

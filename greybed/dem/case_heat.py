@@ -98,7 +98,7 @@ def sample_of(case: ParticleCase, heat: Heat) -> dict[str, float]:
     return {
         "mean temperature [K]": heat.mean,
         **{
-            f"heat from {wall.name} [J]": float(given)
+            f"heat from {wall.name}{heat.beside} [J]": float(given)
             for wall, given in zip(case.wall, heat.from_walls, strict=True)
             if wall.temperature is not None
         },
@@ -113,7 +113,7 @@ def heat_results(case: ParticleCase, heat: Heat, history: Sequence[dict[str, flo
         "lowest_temperature_K": float(t.min()),
         "highest_temperature_K": float(t.max()),
         "from_walls_J": {
-            wall.name: history[-1][f"heat from {wall.name} [J]"]
+            f"{wall.name}{heat.beside}": history[-1][f"heat from {wall.name}{heat.beside} [J]"]
             for wall in case.wall
             if wall.temperature is not None
         },

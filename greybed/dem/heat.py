@@ -49,6 +49,8 @@ class Heat:
         For numbers out of range, a wall that is not there, or clumps.
     """
 
+    beside = ""  # what else the heat of a wall holds, in words; see Warmth of dem/lammps
+
     def __init__(
         self,
         simulation: Simulation,

@@ -15,6 +15,8 @@ from greybed.closures.viewfactor.closure import Domain
 from greybed.core import InputError
 
 LARGEST = float(np.finfo(np.float64).max)
+# Numbers before a tanh that need no care: 2^k of e^(2 x) is far from the ends of what doubles hold.
+REACH = 300.0
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,8 @@ def forest_tables(forest: Forest) -> list[Table]:
         Table("roots", "std::int32_t", forest.roots),
         Table("feature", "std::int8_t", forest.feature),
         Table("threshold", "float", threshold.astype(np.float32)),
-        Table("following", "std::int32_t", following.astype(np.int32)),
+        # As bytes, lowest first: compilers read strings several times faster than numbers.
+        Table("following", "std::int8_t", following.astype("<i4").view(np.int8)),
         doubles("leaf_values", forest.value[leaf]),
     ]
 
@@ -182,10 +185,32 @@ def learnt_context(predictor: Network | Forest, domain: Domain) -> dict[str, Any
         context |= {
             "layers": list(pairwise(sizes)),
             "bend": "Bent" if predictor.bent else "Tanh",
+            "far": repr(REACH),
+            **_reaches(predictor),
         }
     else:
         context |= {"n_raw": predictor.value.shape[1], "n_trees": len(predictor.roots)}
     return context
+
+
+def _reaches(network: Network) -> dict[str, Any]:
+    """Where numbers before a tanh may pass ``REACH``, and the exported network has to hold them.
+
+    ``reaches`` bounds those of the first layer: a constant, and a factor for the size of each
+    scaled feature. ``held`` are the further layers that are held in any case.
+    """
+    if network.bent:
+        return {"reaches": [], "held": []}
+    weights, biases = network.weights, network.biases
+    most = [np.abs(biases[0]).max(), *np.abs(weights[0]).max(axis=1)]
+    further = [
+        (np.abs(b) + np.abs(w).sum(axis=0)).max()
+        for w, b in zip(weights[1:-1], biases[1:-1], strict=True)
+    ]
+    return {
+        "reaches": [repr(float(x)) for x in finite(most)],
+        "held": [k for k, bound in enumerate(further, start=2) if not bound < REACH],
+    }
 
 
 def finite(values: Any) -> NDArray:

@@ -150,6 +150,9 @@ def test_the_settled_bed_cools_and_no_heat_is_lost():
     assert run.worst["energy"] < 1e-10
     stored = float(heat.heat.capacities @ (heat.heat.temperatures - start))
     assert abs(stored - flows[:3].sum()) < 1e-10 * flows[3]
+    last = run.tally.history[-1]
+    told = [last["heat from the gas [J]"], last["heat by radiation from walls and opening [J]"]]
+    np.testing.assert_allclose(told, flows[:2], rtol=1e-12)
     # All three take heat from the bed, and each a share that counts.
     assert flows[:3].max() < -1e-3 * abs(stored)
 

@@ -32,8 +32,9 @@ def test_nothing_missing_is_said_with_what_would_have_been_seen():
 def test_what_is_called_detectable_is_detected():
     found = diagnose(spheres(2))
     amplitude = found.detectable["effects"]["shape"]["amplitude"]
-    seen = [diagnose(spheres(s, effects={"shape": amplitude})).verdict for s in range(40, 50)]
-    assert sum(verdict != "none" for verdict in seen) >= 7  # nine in ten is promised
+    seen = [diagnose(spheres(s, effects={"shape": amplitude})).verdict for s in range(40, 46)]
+    # Nine in ten are promised: fewer than four of six come by chance once in sixty times.
+    assert sum(verdict != "none" for verdict in seen) >= 4
 
 
 @pytest.mark.parametrize("name", ["wall", "inertia", "shape", "viscosity-temperature"])

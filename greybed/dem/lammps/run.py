@@ -73,7 +73,9 @@ class LammpsRun(LiggghtsRun):
             rows = np.column_stack([self.simulation.rows, self._temperatures])
             self.simulation = replace(self.simulation, rows=rows)
             walls = [wall.temperature is not None for wall in case.wall]
-            self.heat = Warmth(self, self._capacity, walls)
+            shines = any("greybed/radiation" in words for words in fixes)
+            beside = " and radiation" if shines else ""
+            self.heat = Warmth(self, self._capacity, walls, beside)
 
     def _words(self, ranks: int) -> list[str]:
         return needed_lammps().command(ranks, "-in", DECK, "-log", LOG, "-echo", "none", "-nocite")

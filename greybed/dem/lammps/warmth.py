@@ -48,9 +48,12 @@ class Warmth:
         [J/kg/K]
     warm : list of bool
         Which walls have a temperature: one at most, so that it has given what is there.
+    beside : str
+        What else gives heat, in words: a fix that radiates is in the same sum.
     """
 
-    def __init__(self, run: Any, capacity: Array, warm: list[bool]) -> None:
+    def __init__(self, run: Any, capacity: Array, warm: list[bool], beside: str = "") -> None:
+        self.beside = beside
         self._run, self._capacity, self._warm = run, capacity, np.array(warm, dtype=bool)
         self._start = self._content()
 

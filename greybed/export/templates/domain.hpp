@@ -9,7 +9,7 @@ GREYBED_DEVICE inline double distance2(const double* features, double* away, dou
   sums.set(0.0);
   for (int i = 0; i < N_FEATURES; ++i) {
     away[i] = features[i] - domain_centre()[i];
-    sums.add(domain_precision() + N_COLUMNS * i, four(away[i]));
+    sums.add(domain_precision() + N_COLUMNS * i, eight(away[i]));
   }
   sums.put(across);
   double sum = 0.0;

@@ -9,10 +9,10 @@ struct Dual {
   GREYBED_HOT explicit Dual(double value) : v(value) { d.set(0.0); }
   /// f(x) with its slope.
   GREYBED_HOT Dual(double value, double slope, const Dual& x) : v(value) {
-    d.scaled(x.d, four(slope));
+    d.scaled(x.d, eight(slope));
   }
   GREYBED_HOT Dual(double value, double s, const Dual& x, double t, const Dual& y) : v(value) {
-    d.mix(x.d, four(s), y.d, four(t));
+    d.mix(x.d, eight(s), y.d, eight(t));
   }
 };
 
@@ -76,7 +76,7 @@ GREYBED_HOT double pow_of(double x, double power) { return std::pow(x, power); }
 GREYBED_HOT double rest_of(double x) { return x < 1.0 ? 1.0 - x : 0.0; }
 /// tanh of one number, as the layers have it.
 GREYBED_DEVICE inline double tanh_of(double x) {
-  v4 y = four(x);
+  v4 y = four(x < -20.0 ? -20.0 : (x > 20.0 ? 20.0 : x));
   v4 slope;
   Tanh::squash(y, slope);
   double all[4];

@@ -1,4 +1,4 @@
-{# Four doubles at a time: vectors of the processor where there are some, else a plain struct. #}
+{# Four and eight doubles at a time: vectors of the processor where there are some, else a plain struct. #}
 /// Two of a kind, for processors with shorter vectors than four doubles, or none.
 template <class L>
 struct Two {
@@ -35,12 +35,18 @@ GREYBED_HOT double root(double x) { return std::sqrt(x); }
 GREYBED_HOT double larger(double x, double y) { return x < y ? y : x; }
 GREYBED_HOT double smaller(double x, double y) { return x < y ? x : y; }
 GREYBED_HOT double total(double v) { return v; }
-/// The whole number k next to y, |y| < 1000, and power = 2^k. No step relies on the order of rounding.
-GREYBED_HOT void rounded(double y, double& k, double& power) {
-  const int whole = static_cast<int>(y + (y < 0.0 ? -0.5 : 0.5));
-  k = whole;
-  const std::uint64_t bits = static_cast<std::uint64_t>(whole + 1023) << 52;
-  std::memcpy(&power, &bits, sizeof power);
+/// The whole number k next to y, |y| < 2000, and in its bits for times_power. No step relies on the
+/// order of rounding.
+GREYBED_HOT void rounded(double y, double& k, double& bits) {
+  k = bits = static_cast<double>(static_cast<int>(y + (y < 0.0 ? -0.5 : 0.5)));
+}
+/// x 2^k by its exponent; neither is 0 or tiny.
+GREYBED_HOT double times_power(double x, double k) {
+  std::uint64_t whole;
+  std::memcpy(&whole, &x, sizeof x);
+  whole += static_cast<std::uint64_t>(static_cast<std::int64_t>(k)) << 52;
+  std::memcpy(&x, &whole, sizeof x);
+  return x;
 }
 /// x = 2^k z with sqrt(1/2) <= z < sqrt(2), for positive x that is not tiny.
 GREYBED_HOT void parted(double x, double& k, double& z) {
@@ -66,14 +72,16 @@ GREYBED_HOT d2 smaller(const d2& x, const d2& y) { return _mm_min_pd(x, y); }
 /// A number that the compiler knows nothing of from here on.
 GREYBED_HOT void hide(d2& v) { __asm__("" : "+x"(v)); }
 GREYBED_HOT double total(const d2& v) { return v[0] + v[1]; }
-GREYBED_HOT void rounded(const d2& y, d2& k, d2& power) {
+GREYBED_HOT void rounded(const d2& y, d2& k, d2& bits) {
   const d2 magic = _mm_set1_pd(6755399441055744.0);  // 1.5 * 2^52: adding it rounds
-  d2 t = y + magic;
-  hide(t);  // -ffast-math would put what is added and what is taken off together,
-  k = t - magic;
+  bits = y + magic;
+  hide(bits);  // -ffast-math would put what is added and what is taken off together,
+  k = bits - magic;
   hide(k);  // ... or share out a product
-  power = _mm_castsi128_pd(
-      _mm_slli_epi64(_mm_add_epi64(_mm_castpd_si128(t), _mm_set1_epi64x(1023)), 52));
+}
+GREYBED_HOT d2 times_power(const d2& x, const d2& bits) {
+  return _mm_castsi128_pd(
+      _mm_add_epi64(_mm_castpd_si128(x), _mm_slli_epi64(_mm_castpd_si128(bits), 52)));
 }
 GREYBED_HOT void parted(const d2& x, d2& k, d2& z) {
   const __m128i bits = _mm_castpd_si128(x);
@@ -102,22 +110,21 @@ GREYBED_HOT d4 larger(const d4& x, const d4& y) { return _mm256_max_pd(x, y); }
 GREYBED_HOT d4 smaller(const d4& x, const d4& y) { return _mm256_min_pd(x, y); }
 GREYBED_HOT void hide(d4& v) { __asm__("" : "+x"(v)); }
 GREYBED_HOT double total(const d4& v) { return (v[0] + v[1]) + (v[2] + v[3]); }
-GREYBED_HOT void rounded(const d4& y, d4& k, d4& power) {
+GREYBED_HOT void rounded(const d4& y, d4& k, d4& bits) {
   const d4 magic = _mm256_set1_pd(6755399441055744.0);
-  d4 t = y + magic;
-  hide(t);
-  k = t - magic;
+  bits = y + magic;
+  hide(bits);
+  k = bits - magic;
   hide(k);
+}
+GREYBED_HOT d4 times_power(const d4& x, const d4& bits) {
 #if defined(__AVX2__) || defined(GREYBED_AVX2)
-  power = _mm256_castsi256_pd(_mm256_slli_epi64(
-      _mm256_add_epi64(_mm256_castpd_si256(t), _mm256_set1_epi64x(1023)), 52));
+  return _mm256_castsi256_pd(
+      _mm256_add_epi64(_mm256_castpd_si256(x), _mm256_slli_epi64(_mm256_castpd_si256(bits), 52)));
 #else
-  const __m128i bias = _mm_set1_epi64x(1023);
-  const __m128i low = _mm_castpd_si128(_mm256_castpd256_pd128(t));
-  const __m128i high = _mm_castpd_si128(_mm256_extractf128_pd(t, 1));
-  power = _mm256_insertf128_pd(
-      _mm256_castpd128_pd256(_mm_castsi128_pd(_mm_slli_epi64(_mm_add_epi64(low, bias), 52))),
-      _mm_castsi128_pd(_mm_slli_epi64(_mm_add_epi64(high, bias), 52)), 1);
+  const d2 low = times_power(_mm256_castpd256_pd128(x), _mm256_castpd256_pd128(bits));
+  const d2 high = times_power(_mm256_extractf128_pd(x, 1), _mm256_extractf128_pd(bits, 1));
+  return _mm256_insertf128_pd(_mm256_castpd128_pd256(low), high, 1);
 #endif
 }
 GREYBED_HOT void parted(const d4& x, d4& k, d4& z) {
@@ -129,6 +136,64 @@ GREYBED_HOT void parted(const d4& x, d4& k, d4& z) {
   parted(high, k_high, high);
   k = _mm256_insertf128_pd(_mm256_castpd128_pd256(k_low), k_high, 1);
   z = _mm256_insertf128_pd(_mm256_castpd128_pd256(low), high, 1);
+}
+#endif
+
+// Eight at a time. With GREYBED_EIGHT also where the processor has only four, which tests this code.
+#if defined(GREYBED_WIDE) && (defined(__AVX512F__) || defined(GREYBED_AVX512) || defined(GREYBED_EIGHT))
+#define GREYBED_WIDEST 1
+typedef double d8 __attribute__((__vector_size__(64)));
+typedef long long i8 __attribute__((__vector_size__(64)));
+GREYBED_HOT void load(const double* p, d8& v) { std::memcpy(&v, p, sizeof v); }
+GREYBED_HOT void store(const d8& v, double* p) { std::memcpy(p, &v, sizeof v); }
+GREYBED_HOT void spread(double x, d8& v) {
+  const d8 all = {x, x, x, x, x, x, x, x};
+  v = all;
+}
+GREYBED_HOT void add_product(d8& sum, const d8& x, const d8& y) { sum += x * y; }
+GREYBED_HOT d4 half(const d8& v) {
+  d4 low;
+  std::memcpy(&low, &v, sizeof low);
+  return low;
+}
+GREYBED_HOT double total(const d8& v) {
+  return ((v[0] + v[4]) + (v[1] + v[5])) + ((v[2] + v[6]) + (v[3] + v[7]));
+}
+#if defined(__AVX512F__) || defined(GREYBED_AVX512)
+GREYBED_HOT void root_of(const d8& x, d8& r) { r = _mm512_sqrt_pd(x); }
+GREYBED_HOT void hide(d8& v) { __asm__("" : "+v"(v)); }
+#else
+GREYBED_HOT void root_of(const d8& x, d8& r) {
+  d4 part[2];
+  std::memcpy(part, &x, sizeof x);
+  part[0] = root(part[0]);
+  part[1] = root(part[1]);
+  std::memcpy(&r, part, sizeof r);
+}
+GREYBED_HOT void hide(d8& v) { __asm__("" : "+m"(v)); }
+#endif
+GREYBED_HOT d8 root(const d8& x) {
+  d8 r;
+  root_of(x, r);
+  return r;
+}
+GREYBED_HOT void rounded(const d8& y, d8& k, d8& bits) {
+  d8 magic;
+  spread(6755399441055744.0, magic);
+  bits = y + magic;
+  hide(bits);
+  k = bits - magic;
+  hide(k);
+}
+GREYBED_HOT d8 times_power(const d8& x, const d8& bits) {
+  i8 whole;
+  i8 power;
+  std::memcpy(&whole, &x, sizeof x);
+  std::memcpy(&power, &bits, sizeof bits);
+  whole += power << 52;
+  d8 r;
+  std::memcpy(&r, &whole, sizeof r);
+  return r;
 }
 #endif
 
@@ -172,11 +237,15 @@ GREYBED_HOT double total(const Two<L>& v) {
   return total(v.a) + total(v.b);
 }
 template <class L>
-GREYBED_HOT void rounded(const Two<L>& y, Two<L>& k, Two<L>& power) {
-  rounded(y.a, k.a, power.a);
-  rounded(y.b, k.b, power.b);
+GREYBED_HOT void rounded(const Two<L>& y, Two<L>& k, Two<L>& bits) {
+  rounded(y.a, k.a, bits.a);
+  rounded(y.b, k.b, bits.b);
 }
-
+template <class L>
+GREYBED_HOT Two<L> times_power(const Two<L>& x, const Two<L>& bits) {
+  const Two<L> r = {times_power(x.a, bits.a), times_power(x.b, bits.b)};
+  return r;
+}
 template <class L>
 GREYBED_HOT void parted(const Two<L>& x, Two<L>& k, Two<L>& z) {
   parted(x.a, k.a, z.a);
@@ -210,6 +279,18 @@ GREYBED_HOT v4 four(double a, double b, double c, double d) {
 #endif
 GREYBED_HOT v4 four(double x) {
   v4 v;
+  spread(x, v);
+  return v;
+}
+
+#if defined(GREYBED_WIDEST)
+typedef d8 v8;
+#else
+typedef Two<v4> v8;
+GREYBED_HOT v4 half(const v8& v) { return v.a; }
+#endif
+GREYBED_HOT v8 eight(double x) {
+  v8 v;
   spread(x, v);
   return v;
 }

@@ -150,8 +150,9 @@ const {{ name }}_library library = {
 #undef GREYBED_AVX2
 #undef GREYBED_VECTORS
 #undef GREYBED_WIDE
-#undef GREYBED_SHARED_1
+#undef GREYBED_SHARED_2
 #undef {{ guard }}
+#define GREYBED_NO_DISPATCH 1
 #endif  // GREYBED_DISPATCH
 {% endif %}
 

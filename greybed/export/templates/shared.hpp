@@ -3,7 +3,22 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#if defined(__AVX__)
+{% if kind == "mlp" %}
+// Programs for any x86-64 processor take the way of AVX2 through networks where the processor has it.
+#if defined(__x86_64__) && defined(__SSE2__) && !defined(__AVX2__) && !defined(GREYBED_AVX2) && \
+    !defined(GREYBED_NO_DISPATCH) && !defined(__CUDA__) && !defined(__CUDACC__) && !defined(__HIPCC__)
+#if defined(__clang__)
+#if __clang_major__ >= 9
+#define GREYBED_DISPATCHES 1
+#endif
+#elif defined(__GNUC__)
+#if __GNUC__ >= 8
+#define GREYBED_DISPATCHES 1
+#endif
+#endif
+#endif
+{% endif %}
+#if defined(__AVX__) || defined(GREYBED_DISPATCHES)
 #include <immintrin.h>
 #elif defined(__SSE2__)
 #include <emmintrin.h>
@@ -19,8 +34,8 @@
 #define GREYBED_TYPE
 #endif
 
-#ifndef GREYBED_SHARED_1
-#define GREYBED_SHARED_1
+#ifndef GREYBED_SHARED_2
+#define GREYBED_SHARED_2
 
 // Functions that a graphics processor can run as well; define it yourself for other compilers.
 #ifndef GREYBED_DEVICE
@@ -74,7 +89,7 @@ struct GREYBED_TYPE Guard {
   }
 };
 
-namespace shared1 {
+namespace shared2 {
 
 GREYBED_DEVICE inline std::uint64_t as_bits(double v) {
   std::uint64_t bits;
@@ -135,6 +150,47 @@ GREYBED_DEVICE inline double logistic(double x) {
 
 {% include "dual.hpp" %}
 
-}  // namespace shared1
+}  // namespace shared2
 }  // namespace greybed
-#endif  // GREYBED_SHARED_1
+#endif  // GREYBED_SHARED_2
+{% if kind == "mlp" %}
+#if defined(GREYBED_DISPATCHES) && !defined(GREYBED_SHARED_2_AVX2)
+#define GREYBED_SHARED_2_AVX2 1
+// The same for processors with AVX2 and FMA, inside a program that was compiled for any.
+#define GREYBED_AVX2 1
+#if defined(__clang__)
+#pragma clang attribute push(__attribute__((target("avx2,fma"))), apply_to = function)
+#else
+#pragma GCC push_options
+#pragma GCC target("avx2,fma")
+#endif
+namespace greybed {
+namespace shared2 {
+namespace avx2 {
+{% include "lanes.hpp" %}
+
+{% include "bends.hpp" %}
+
+{% include "layers.hpp" %}
+}  // namespace avx2
+}  // namespace shared2
+}  // namespace greybed
+#if defined(__clang__)
+#pragma clang attribute pop
+#else
+#pragma GCC pop_options
+#endif
+#undef GREYBED_AVX2
+#undef GREYBED_WIDE
+
+namespace greybed {
+namespace shared2 {
+/// Whether this processor, and its system, has them.
+inline bool has_avx2() {
+  return __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
+}
+}  // namespace shared2
+}  // namespace greybed
+#endif
+
+{% endif %}
