@@ -4,9 +4,12 @@
 
 Names: factorial, coverage, tradeoff, overhead, grid, seven; all of them by default. The twins are
 formulae (greybed/calibration/twins.py), so what is measured is the method, not a simulation.
+``coverage`` and ``tradeoff`` tell each study on the error stream, so that a run that is stopped
+is not lost; ``--first`` goes on from there.
 """
 
 import argparse
+import sys
 import time
 from dataclasses import replace
 
@@ -101,10 +104,18 @@ def factorial(studies):
     )
 
 
+FIRST = 0  # seed of the first study of coverage and tradeoff
+
+
+def told(*words):
+    """One study, as it comes."""
+    print(*words, file=sys.stderr, flush=True)
+
+
 def coverage(studies):
     """Share of studies whose 90 % region holds the truth."""
     region, interval = [], []
-    for seed in range(studies or 100):
+    for seed in range(FIRST, FIRST + (studies or 100)):
         truth = np.random.default_rng([seed, 7]).random(2)
         study = draw_down(seed, truth, 16)
         with Campaign(study.experiments, Store(":memory:"), seed=seed) as campaign:
@@ -116,6 +127,7 @@ def coverage(studies):
         region.append([density >= posterior.level(share) for share in (0.5, 0.9)])
         ends = posterior.interval()
         interval.append((ends[:, 0] <= truth) & (truth <= ends[:, 1]))
+        told("coverage", seed, *map(int, region[-1]), *map(int, interval[-1]))
     half, most = np.mean(region, axis=0)
     print(
         f"coverage   {len(region)} studies of 16 runs: the 90 % region holds the truth in "
@@ -127,7 +139,7 @@ def coverage(studies):
 def tradeoff(studies):
     """One angle of repose, two frictions: one open direction, and the test that ends it."""
     one, named = [], []
-    for seed in range(studies or 100):
+    for seed in range(FIRST, FIRST + (studies or 100)):
         truth = 0.15 + 0.7 * np.random.default_rng([seed, 5]).random(2)
         scatter = 0.7 * np.random.default_rng([seed, 6]).standard_normal()
         angle = HeapTwin.exact(FRICTIONS.named(truth)) + scatter
@@ -143,6 +155,7 @@ def tradeoff(studies):
         found = calibrate(study)
         one.append(len(found.open_directions) == 1)
         named.append(found.next_tests[0].name == "hopper")
+        told("tradeoff", seed, int(one[-1]), int(named[-1]))
     print(
         f"tradeoff   {len(one)} studies of 14 runs: one open direction in {100 * np.mean(one):.0f} "
         f"%, the hopper named as the next test in {100 * np.mean(named):.0f} %"
@@ -258,7 +271,9 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", choices=[*TABLE, []], help="which")
     parser.add_argument("--studies", type=int, default=0, help="instead of the full number")
+    parser.add_argument("--first", type=int, default=0, help="seed of the first study")
     options = parser.parse_args()
+    FIRST = options.first
     for chosen in options.names or TABLE:
         begin = time.perf_counter()
         TABLE[chosen](options.studies)

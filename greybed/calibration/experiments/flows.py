@@ -11,12 +11,12 @@ import numpy as np
 
 from greybed.calibration.experiment import Measure, RunFailed, Value, named
 from greybed.calibration.experiments.case import History, column
-from greybed.calibration.experiments.grains import Grains
+from greybed.calibration.experiments.shaped import ShapedGrains
 from greybed.core.config import quantity, whole
 
 
 @dataclass(frozen=True, kw_only=True)
-class Hopper(Grains):
+class Hopper(ShapedGrains):
     """``kind = "hopper"``: a cone, or a flat floor with a hole, under a tube."""
 
     kind: ClassVar[str] = "hopper"
@@ -78,7 +78,7 @@ class Hopper(Grains):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Drop(Grains):
+class Drop(ShapedGrains):
     """``kind = "drop"``: a portion falls through a tube, seen from the side (source paper 002)."""
 
     kind: ClassVar[str] = "drop"

@@ -47,6 +47,8 @@ class Grains(Listed, ParticleExperiment):
     wall_cohesion: float = quantity("dimensionless", 0.0, at_least=0.0)
     rolling_law: str = choice(tuple(ROLLING), "epsd-modified")
     cohesion_law: str = choice(tuple(COHESION), "none")
+    limit_force: bool = False  # no attraction by damping
+    time_step: float | None = quantity("time", None, above=0.0)  # a tenth of Rayleigh's [s]
     # Kept for every parameter set: the grains' density follows from how they settle [kg/m3].
     bulk_density: float | None = quantity("density", None, above=0.0)
 
@@ -124,10 +126,12 @@ class Grains(Listed, ParticleExperiment):
             "youngs_modulus": self.number(values, "youngs_modulus"),
             "poissons_ratio": self.number(values, "poissons_ratio"),
         }
+        step = {} if self.time_step is None else {"time_step": self.time_step}
         return {
             "kind": "particles",
             "duration": duration,
-            "law": {"rolling": self.rolling_law, "cohesion": law},
+            **step,
+            "law": {"rolling": self.rolling_law, "cohesion": law, "limit_force": self.limit_force},
             "material": [{"name": "grains", **material}, {"name": "walls", **material}],
             "contact": [
                 {"between": ["grains", "grains"], **contact("")},

@@ -12,6 +12,7 @@ import numpy as np
 from greybed.calibration.experiment import Measure, RunFailed, Value, named
 from greybed.calibration.experiments.case import History, column
 from greybed.calibration.experiments.grains import Grains, plane, rectangle
+from greybed.calibration.experiments.shaped import ShapedGrains
 from greybed.core.config import quantity, whole
 
 
@@ -62,7 +63,7 @@ class LiftingCylinder(Grains):
 
 
 @dataclass(frozen=True, kw_only=True)
-class DrawDownBox(Grains):
+class DrawDownBox(ShapedGrains):
     """``kind = "draw-down-box"``: a flap opens in the floor of a box, a heap forms below."""
 
     kind: ClassVar[str] = "draw-down-box"
@@ -72,40 +73,58 @@ class DrawDownBox(Grains):
         Measure(name="mass", unit="kg", what="mass in the lower box"),
         Measure(name="mass_share", what="mass in the lower box over that of all"),
         Measure(name="mass_flow", unit="kg/s", what="into the lower box, from 20 to 80 %"),
-        Measure(name="arch", what="1 where less than 2 % has come down, 0 otherwise"),
+        Measure(name="over_share", what="of what was over the middle half of the opening, stays"),
+        Measure(name="arch", what="1 where a tenth of that stays or more, 0 otherwise"),
     )
     count: int = whole(900, at_least=100)
     width: float = quantity("dimensionless", 22.0, above=10.0)  # of the boxes over d [-]
-    depth: float = quantity("dimensionless", 4.0, at_least=3.0)  # over d [-]
+    depth: float = quantity("dimensionless", 4.0, at_least=1.1)  # over d [-]
+    repeats: bool = False  # no front and back: the slice repeats
     opening: float = quantity("dimensionless", 6.0, above=0.0)  # over d [-]
     fall: float = quantity("dimensionless", 16.0, above=2.0)  # height of the lower box over d [-]
+    lasts: float | None = quantity("time", None, above=0.0)  # from the opening on [s]
+
+    def _start(self) -> tuple[float, float]:
+        """Height of the first grains, and time at which the flap opens."""
+        top = 4.0 * self.count * self.d * 0.524 / (self.width * self.depth)
+        return top, 0.1 + 1.2 * float(np.sqrt(2.0 * top / 9.81))
 
     def case(self, values: Mapping[str, float]) -> dict[str, Any]:
         """See :meth:`ParticleExperiment.case`."""
         d = self.d
         w, t, o, h = 0.5 * self.width * d, self.depth * d, 0.5 * self.opening * d, self.fall * d
-        top = 4.0 * self.count * d**3 * 0.524 / (2.0 * w * t)
-        start = 0.1 + 1.2 * float(np.sqrt(2.0 * top / 9.81))
-        content = self.tables(values, start + 1.0 + 6.0 * float(np.sqrt(2.0 * h / 9.81)))
-        up, across = [0.0, 0.0, 1.0], [0.0, t, 0.0]
+        thick = 2.0 * self.radius  # of the spheres
+        top, start = self._start()
+        lasts = self.lasts or 1.0 + 6.0 * float(np.sqrt(2.0 * h / 9.81))
+        content = self.tables(values, start + lasts)
+        # A wall that ends at a periodic face would have an edge there.
+        y, deep = (-t, 3.0 * t) if self.repeats else (0.0, t)
+        up, across = [0.0, 0.0, 1.0], [0.0, deep, 0.0]
+        sides = [] if self.repeats else [
+            plane("front", [0.0, 0.0, 0.0], [0.0, 1.0, 0.0]),
+            plane("back", [0.0, t, 0.0], [0.0, -1.0, 0.0]),
+        ]  # fmt: skip
+        if self.repeats:
+            content["periodic"] = {"lower": [-w, 0.0, -h], "upper": [w, t, 2.0 * top], "axes": "y"}
         content |= {
             "wall": [
                 plane("left", [-w, 0.0, 0.0], [1.0, 0.0, 0.0]),
                 plane("right", [w, 0.0, 0.0], [-1.0, 0.0, 0.0]),
-                plane("front", [0.0, 0.0, 0.0], [0.0, 1.0, 0.0]),
-                plane("back", [0.0, t, 0.0], [0.0, -1.0, 0.0]),
-                rectangle("floor left", [-w, 0.0, 0.0], [w - o, 0.0, 0.0], across),
-                rectangle("floor right", [o, 0.0, 0.0], [w - o, 0.0, 0.0], across),
-                rectangle("flap", [-o, 0.0, 0.0], [2.0 * o, 0.0, 0.0], across, removed=start),
+                *sides,
+                rectangle("floor left", [-w, y, 0.0], [w - o, 0.0, 0.0], across),
+                rectangle("floor right", [o, y, 0.0], [w - o, 0.0, 0.0], across),
+                rectangle("flap", [-o, y, 0.0], [2.0 * o, 0.0, 0.0], across, removed=start),
                 plane("ground", [0.0, 0.0, -h], up),
             ],
             "particles": [self.pack(self.count, [-w, 0.0, 0.0], [w, t, top])],
             "measure": [
                 {"name": "lower", "kind": "solid", "lower": [-w, 0.0, -h], "upper": [w, t, 0.0]},
-                {"name": "shear", "kind": "pile", "axis": "x", "width": d, "above": 0.0,
-                 "lower": -w + d, "upper": -o},
-                {"name": "heap", "kind": "pile", "axis": "x", "width": 1.5 * d, "below": 0.0,
-                 "lower": 0.0, "upper": w - d},
+                {"name": "over", "kind": "solid", "lower": [-0.5 * o, 0.0, 0.0],
+                 "upper": [0.5 * o, t, top]},
+                {"name": "shear", "kind": "pile", "axis": "x", "width": thick, "above": 0.0,
+                 "lower": -w + thick, "upper": -o},
+                {"name": "heap", "kind": "pile", "axis": "x", "width": 1.5 * thick, "below": 0.0,
+                 "lower": 0.0, "upper": w - thick},
             ],
         }  # fmt: skip
         return content
@@ -115,15 +134,19 @@ class DrawDownBox(Grains):
         time, mass = column(history, "time [s]"), column(history, "mass in lower [kg]")
         total = float(results["mass_kg"])
         share = float(mass[-1]) / total
+        above = column(history, "mass in over [kg]")
+        over = float(above[-1] / np.interp(self._start()[1], time, above))
         found: dict[str, Value] = {
-            "mass": float(mass[-1]), "mass_share": share, "arch": float(share < 0.02),
+            "mass": float(mass[-1]), "mass_share": share, "over_share": over,
+            "arch": float(over >= 0.1),
         }  # fmt: skip
         inside = (mass >= 0.2 * mass[-1]) & (mass <= 0.8 * mass[-1]) & (mass > 0.0)
-        arched = share < 0.02
+        arched = over >= 0.1
         flow = float(np.polyfit(time[inside], mass[inside], 1)[0]) if inside.sum() > 2 else 0.0
-        found["mass_flow"] = 0.0 if arched else flow
+        found["mass_flow"] = 0.0 if share < 0.02 else flow
         found["shear_angle"] = 90.0 if arched else flank_angle(results["measures"]["shear"])
-        found["repose_angle"] = 0.0 if arched else flank_angle(results["measures"]["heap"])
+        little = share < 0.02
+        found["repose_angle"] = 0.0 if little else flank_angle(results["measures"]["heap"])
         return found
 
 
