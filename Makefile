@@ -1,10 +1,10 @@
-# The project's commands: quickstart, test, bench; each makes .venv first.
+# The project's commands: quickstart, test, docs, verification, bench; each makes .venv first.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: quickstart test lint bench hooks clean help
+.PHONY: quickstart test lint docs verification bench hooks clean help
 help:            ## list the commands
 	@grep -E '^[a-z]+: .*##' $(MAKEFILE_LIST) | sed 's/:.*##/ -/'
 
@@ -21,13 +21,24 @@ test: $(STAMP)   ## lint, types, import contracts, tests
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest -n 2 --dist worksteal --durations=10
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal --durations=10
 
 lint: $(STAMP)   ## mend what can be mended, show the rest
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+$(VENV)/.installed-docs: $(STAMP)
+	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --progress-bar off -e '.[docs]'
+	touch $@
+
+docs: $(VENV)/.installed-docs ## pages and module reference as HTML in build/docs; a dead link fails
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -c docs . build/docs
+	@echo open build/docs/index.html
+
+verification: $(STAMP) ## every figure of docs/verification.md anew, pass or fail; ten minutes
+	$(BIN)/python examples/verification/run.py
 
 bench: $(STAMP)  ## benchmarks against peers; not part of the tests
 	$(BIN)/python benchmarks/raytrace.py

@@ -4,6 +4,7 @@ import ast
 import gzip
 import importlib
 import inspect
+import json
 import pkgutil
 import re
 from pathlib import Path
@@ -57,8 +58,57 @@ def test_links_lead_somewhere(page):
 
 def test_every_page_is_in_the_index():
     index = (ROOT / "docs/index.md").read_text()
-    for page in ROOT.glob("docs/*.md"):
-        assert page.name == "index.md" or f"({page.name})" in index, page.name
+    for page in [*ROOT.glob("docs/*.md"), *ROOT.glob("docs/tutorials/*.md")]:
+        name = str(page.relative_to(ROOT / "docs"))
+        assert name == "index.md" or f"({name})" in index, name
+
+
+def test_the_reference_names_every_room():
+    named = "\n".join(page.read_text() for page in ROOT.glob("docs/api/*.rst"))
+    modules = re.findall(r"^\.\. automodule:: (\S+)$", named, re.M)
+    assert len(modules) == len(set(modules))
+    for name in modules:
+        assert importlib.import_module(name).__doc__
+    # What a package exports is described there, or where a module of it is described.
+    for name in PACKAGES:
+        if getattr(importlib.import_module(name), "__all__", ()) and name != "greybed":
+            assert name in modules or name in {"greybed.cli"}, name
+    listed = (ROOT / "docs/api/index.md").read_text()
+    for page in ROOT.glob("docs/api/*.rst"):
+        assert f"({page.name})" in listed, page.name
+
+
+def test_the_page_of_verification_is_what_was_found(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "examples/verification")
+    run = importlib.import_module("run")
+    recorded = json.loads(run.RESULTS.read_text())["groups"]
+    page = run.PAGE.read_text()
+    assert page.split(run.BEGIN)[1].split(run.END)[0].strip() == run.text(recorded).strip()
+    assert set(recorded) == set(run.GROUPS)
+    rows = {row["key"]: row for group in recorded.values() for row in group["rows"]}
+    assert set(rows) == set(run.BOUNDS)
+    for key, bound in run.BOUNDS.items():
+        assert rows[key]["pass"] == bound.holds(rows[key]["value"])
+        assert not bound.holds(float("nan"))
+    for group in run.GROUPS.values():
+        for file, _ in group.pictures:
+            assert (ROOT / "docs/images" / file).is_file()
+
+
+@pytest.mark.parametrize(
+    ("kind", "bound", "good", "bad"),
+    [
+        ("within", 0.1, 2.05, 2.2),
+        ("relative", 0.1, 2.15, 2.3),
+        ("most", 3.0, -5.0, 3.1),
+        ("least", 1.0, 7.0, 0.9),
+    ],
+)
+def test_bounds_of_the_verification_can_fail(kind, bound, good, bad, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "examples/verification")
+    rule = importlib.import_module("bounds").Bound("x", 2.0, "", kind, bound)
+    assert rule.holds(good)
+    assert not rule.holds(bad)
 
 
 def exported() -> list[tuple[str, object]]:
@@ -113,7 +163,9 @@ def test_verbs_are_explained(verb, capsys):
     assert end.value.code == 0
     text = capsys.readouterr().out
     assert re.search(r"^examples?:", text, re.I | re.M)
-    assert f"greybed {verb} " in text.split("xample", 1)[1]
+    # The first example is that of the README's table, which tests/test_readme.py runs as printed.
+    first = re.search(rf"greybed {verb} .*", text.split("xample", 1)[1])
+    assert f"| `{verb}` | `{first[0].strip()}` |" in (ROOT / "README.md").read_text()
 
 
 def test_every_dependency_has_its_reason():

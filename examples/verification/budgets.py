@@ -73,8 +73,8 @@ def heat(until: float = 0.06) -> tuple[np.ndarray, dict[str, np.ndarray], np.nda
     return table[:, 0], parts, table[:, -1]
 
 
-def main() -> None:
-    """Draw, and print the largest defects."""
+def measure(picture: Path) -> dict[str, float]:
+    """Draw, and give the largest defects."""
     figure, axes = plt.subplots(1, 3, figsize=(12, 3.8), layout="constrained")
     t, parts, defects = momentum()
     rest = parts.pop("change")
@@ -87,6 +87,7 @@ def main() -> None:
     left = np.abs(rest - sum(parts.values())) / scale
     axes[2].semilogy(t / t[-1], np.maximum(left, 1e-18), label="gas: change less the others")
     axes[2].semilogy(t / t[-1], np.maximum(defects, 1e-18), label="given less taken")
+    found = {"budgets.momentum": float(left.max()), "budgets.exchange": float(defects.max())}
     print(f"momentum: {left.max():.1e} of the sum of the parts; given less taken "
           f"{defects.max():.1e}")  # fmt: skip
     t, parts, defects = heat()
@@ -98,13 +99,19 @@ def main() -> None:
     axes[2].semilogy(t / t[-1], np.maximum(defects, 1e-18), label="heat of each gas step")
     whole = abs(stored[-1] - sum(v[-1] for v in parts.values())) / abs(stored[-1])
     print(f"heat: {defects.max():.1e} of what is exchanged, at the end {whole:.1e}")
+    found["budgets.heat"] = float(defects.max())
     axes[2].axhline(1e-10, color="k", ls=":", lw=0.8)
     axes[2].set(xlabel="time over that of the run", title="What does not add up, relative",
                 ylim=(1e-18, 1e-8))  # fmt: skip
     for axis in axes:
         axis.legend(fontsize=8)
-    name = sys.argv[1] if len(sys.argv) > 1 else "docs/images/budgets.png"
-    figure.savefig(Path(name), dpi=110)
+    figure.savefig(picture, dpi=110)
+    plt.close(figure)
+    return found
+
+
+def main() -> None:
+    measure(Path(sys.argv[1] if len(sys.argv) > 1 else "docs/images/budgets.png"))
 
 
 if __name__ == "__main__":

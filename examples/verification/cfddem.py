@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -169,6 +170,23 @@ def cooling(_: Path) -> dict[str, Any]:
         "time": both.time, "mean_temperature": heat.heat.mean, "from_gas": sums[0],
         "from_surroundings": sums[1], "stored": sums[3], "defect_over_exchanged": rest,
     }  # fmt: skip
+
+
+def measure(out: Path, cases: Sequence[str]) -> dict[str, float]:
+    """What run.py compares, of some of the cases."""
+    found: dict[str, float] = {}
+    if "settling" in cases:
+        found["cfddem.settling"] = settling(out)["largest_error"]
+    if "cooling" in cases:
+        found["cfddem.cooling"] = float(cooling(out)["defect_over_exchanged"])
+    if "ergun" in cases:
+        bed = ergun(out)
+        found |= {
+            "cfddem.ergun": bed["slope_over_ergun"],
+            "cfddem.plateau": bed["plateau_over_weight"] or math.nan,
+            "cfddem.lift": bed["lift_by_load"] / bed["lift_of_ergun"],
+        }
+    return found
 
 
 CASES = {"settling": settling, "ergun": ergun, "cooling": cooling}

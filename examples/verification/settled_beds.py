@@ -145,31 +145,56 @@ def draw(histories: dict[str, list[dict[str, list]]], path: Path) -> None:
     figure.savefig(path, dpi=120)
 
 
+def measure(
+    data: Path,
+    picture: Path,
+    count: int = 2000,
+    seeds: int = 6,
+    duration: float = 0.5,
+    ranks: int = 1,
+) -> dict[str, float]:
+    """Run all beds, write what they have come to, draw, and give what is compared."""
+    histories: dict[str, list[dict[str, list]]] = {engine: [] for engine in ENGINES}
+    for seed in range(1, seeds + 1):
+        for engine in ENGINES:
+            histories[engine].append(settle(count, seed, duration, engine, ranks))
+            print(engine, seed, figures(histories[engine][-1]), flush=True)
+    found = {engine: [figures(h) for h in histories[engine]] for engine in ENGINES}
+    answer = {
+        "spheres": count, "seeds": seeds, "ranks": ranks,
+        "compared": compared(found), "beds": found,
+    }  # fmt: skip
+    data.write_text(json.dumps(answer, indent=1) + "\n")
+    draw(histories, picture)
+    return outcome(answer)
+
+
+def outcome(answer: dict) -> dict[str, float]:
+    """Differences of the means over their standard errors."""
+    rows = answer["compared"]
+    return {
+        f"settled_beds.{name}": abs(rows[key]["difference_over_error"])
+        for name, key in (
+            ("height", "height_m"), ("contacts", "coordination"), ("decay", "energy_gone_s"),
+        )
+    }  # fmt: skip
+
+
 def main() -> None:
-    """Run all beds, and write what they have come to."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--count", type=int, default=2000)
     parser.add_argument("--seeds", type=int, default=6)
     parser.add_argument("--duration", type=float, default=0.5)
     parser.add_argument("--ranks", type=int, default=1)
-    options = parser.parse_args()
-    histories: dict[str, list[dict[str, list]]] = {engine: [] for engine in ENGINES}
-    for seed in range(1, options.seeds + 1):
-        for engine in ENGINES:
-            histories[engine].append(
-                settle(options.count, seed, options.duration, engine, options.ranks)
-            )
-            print(engine, seed, figures(histories[engine][-1]), flush=True)
-    found = {engine: [figures(h) for h in histories[engine]] for engine in ENGINES}
-    answer = {
-        "spheres": options.count, "seeds": options.seeds, "ranks": options.ranks,
-        "compared": compared(found), "beds": found,
-    }  # fmt: skip
-    options.out.mkdir(parents=True, exist_ok=True)
-    (options.out / "settled_beds.json").write_text(json.dumps(answer, indent=1) + "\n")
-    draw(histories, options.out / "settled_beds.png")
-    print(json.dumps(answer["compared"], indent=1))
+    given = parser.parse_args()
+    given.out.mkdir(parents=True, exist_ok=True)
+    print(
+        measure(
+            given.out / "settled_beds.json", given.out / "settled_beds.png",
+            given.count, given.seeds, given.duration, given.ranks,
+        )
+    )  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from greybed.calibration.experiment import Experiment, Value
-from greybed.core.errors import OutputError
+from greybed.core.errors import InputError, OutputError
 
 FORMAT = "greybed calibration runs 1"
 
@@ -77,25 +77,26 @@ class Store:
                 "parameters TEXT, seed INTEGER, results TEXT, error TEXT, seconds REAL, "
                 "finished REAL)"
             )
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:
             raise OutputError(
-                f"{self.path}: no store of runs ({error}); choose another folder with --out, or "
-                "remove the file."
+                f"{self.path}: no store of runs ({error}); free space, choose another folder "
+                "with --out, or remove the file."
             ) from None
 
     def get(self, key: str) -> Outcome | None:
         """A finished run, or None."""
-        row = self._file.execute(
-            "SELECT experiment, parameters, seed, results, error, seconds FROM runs WHERE key = ?",
-            (key,),
-        ).fetchone()
-        if row is None:
-            return None
-        name, values, seed, results, error, seconds = row
-        return Outcome(
-            name, json.loads(values), seed, None if results is None else json.loads(results),
-            error, seconds,
-        )  # fmt: skip
+        try:
+            row = self._file.execute(
+                "SELECT experiment, parameters, seed, results, error, seconds FROM runs "
+                "WHERE key = ?",
+                (key,),
+            ).fetchone()
+            return None if row is None else _outcome(*row)
+        except (sqlite3.Error, ValueError, TypeError, RecursionError) as error:
+            raise InputError(
+                f"{self.path}: this store of runs is damaged ({error}); remove it, and what it "
+                "holds is run again."
+            ) from None
 
     def put(self, key: str, outcome: Outcome) -> None:
         """Keep a finished run; it is on the disk when this returns."""
@@ -119,3 +120,12 @@ class Store:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
+
+
+def _outcome(name: Any, values: Any, seed: Any, results: Any, error: Any, seconds: Any) -> Outcome:
+    """A row as an outcome, or a ValueError or TypeError."""
+    given = json.loads(values)
+    found = None if results is None else json.loads(results)
+    if not isinstance(given, dict) or not (found is None or isinstance(found, dict)):
+        raise ValueError("a row that is no run")
+    return Outcome(str(name), given, int(seed), found, str(error), float(seconds))

@@ -2,7 +2,9 @@
 
 Writes scorecard.json, scorecard.md, sets.csv and summary.json, besides the sets and the answers.
 
-example: greybed blindtest --sets 200 --seed 1 --out runs/blind --competitors
+examples:
+  greybed blindtest --sets 6 --seed 1 --kinds none,one --out runs/blind
+  greybed blindtest --sets 200 --seed 1 --out runs/blind200 --competitors
 """
 
 from __future__ import annotations
@@ -38,7 +40,8 @@ def run(options: argparse.Namespace) -> int:
     """Run the test; returns 0 if no bar that could be judged is missed, else 1."""
     from greybed.blind.run import blind_test
     from greybed.blind.score import compare, score
-    from greybed.core.files import output_folder, sole_writer, write_json, write_summary
+    from greybed.core.files import atomic_path, write_json, write_summary
+    from greybed.core.folder_lock import locked_folder
 
     for name in ("sets", "jobs"):
         if getattr(options, name) < 1:
@@ -49,9 +52,8 @@ def run(options: argparse.Namespace) -> int:
     for kind in kinds:
         if kind not in KINDS:
             raise InputError(f"--kinds: {kind!r} is not known; take some of {', '.join(KINDS)}.")
-    folder = output_folder(options.out)
-    asked = {"sets": options.sets, "seed": options.seed, "kinds": kinds}
-    with sole_writer(folder / ".lock"):
+    with locked_folder(options.out) as folder:
+        asked = {"sets": options.sets, "seed": options.seed, "kinds": kinds}
         _check_same(folder, asked)
         rows = blind_test(
             folder,
@@ -62,25 +64,26 @@ def run(options: argparse.Namespace) -> int:
             competitors=options.competitors,
             show=not options.quiet,
         )
-    refused = [row for row in rows if "refused" in row["found"]]
-    rows = [row for row in rows if "refused" not in row["found"]]
-    lines = score(rows, ALPHA)
-    others = compare(rows)
-    seconds = sorted(row["found"]["seconds"] for row in rows)
-    card: dict[str, Any] = {
-        **asked,
-        "lines": [vars(line) for line in lines],
-        "competitors": others,
-        "seconds_median": seconds[len(seconds) // 2] if seconds else None,
-        "seconds_longest": seconds[-1] if seconds else None,
-        "refused": [{"set": row["set"], "why": row["found"]["refused"]} for row in refused],
-    }
-    write_json(folder / "scorecard.json", card)
-    text = _markdown(card)
-    (folder / "scorecard.md").write_text(text)
-    _write_sets(folder / "sets.csv", rows)
-    met = {line.what: line.met for line in lines}
-    write_summary(folder, "blindtest", {**asked, "met": met}, seed=options.seed)
+        refused = [row for row in rows if "refused" in row["found"]]
+        rows = [row for row in rows if "refused" not in row["found"]]
+        lines = score(rows, ALPHA)
+        others = compare(rows)
+        seconds = sorted(row["found"]["seconds"] for row in rows)
+        card: dict[str, Any] = {
+            **asked,
+            "lines": [vars(line) for line in lines],
+            "competitors": others,
+            "seconds_median": seconds[len(seconds) // 2] if seconds else None,
+            "seconds_longest": seconds[-1] if seconds else None,
+            "refused": [{"set": row["set"], "why": row["found"]["refused"]} for row in refused],
+        }
+        write_json(folder / "scorecard.json", card)
+        text = _markdown(card)
+        with atomic_path(folder / "scorecard.md") as part:
+            part.write_text(text)
+        _write_sets(folder / "sets.csv", rows)
+        met = {line.what: line.met for line in lines}
+        write_summary(folder, "blindtest", {**asked, "met": met}, seed=options.seed)
     print(text)
     print(f"results in {folder}")
     return 1 if any(line.met is False for line in lines) else 0
@@ -131,7 +134,9 @@ def _markdown(card: Mapping[str, Any]) -> str:
 
 
 def _write_sets(path: Path, rows: list[dict[str, Any]]) -> None:
-    with open(path, "w", newline="") as stream:
+    from greybed.core.files import atomic_path
+
+    with atomic_path(path) as part, open(part, "w", newline="") as stream:
         writer = csv.writer(stream)
         keys = [k for k in TRUTH if rows and k in rows[0]["truth"]]
         writer.writerow(["set", *keys, "truth", "verdict", "found", "p_value", "seconds"])

@@ -35,7 +35,8 @@ def run(options: argparse.Namespace) -> int:
     from greybed.calibration.output import write_answer
     from greybed.calibration.read import read_study
     from greybed.core.errors import InputError
-    from greybed.core.files import output_folder, sole_writer, write_summary
+    from greybed.core.files import write_summary
+    from greybed.core.folder_lock import locked_folder
     from greybed.report.calibration import write_page
 
     study = read_study(options.study)
@@ -47,8 +48,7 @@ def run(options: argparse.Namespace) -> int:
     if options.scheduler is not None:
         changed = replace(changed, scheduler=options.scheduler)
     study = replace(study, options=changed)
-    folder = output_folder(options.out)
-    with sole_writer(folder / ".calibrate.lock"):
+    with locked_folder(options.out) as folder:
         found = calibrate(study, folder, show=not options.quiet)
         write_answer(folder, study, found)
         write_page(study, found, folder / "report.html")

@@ -1,6 +1,7 @@
 """Run a case file with many values: on this machine, a cluster of dask, or jobs of Slurm.
 
 Examples:
+  greybed campaign examples/campaign/campaign.toml --out runs/campaign
   greybed campaign study.toml --out runs/study --workers 2
   greybed campaign study.toml --out runs/study --scheduler local
   greybed campaign study.toml --out runs/study --scheduler tcp://head:8786
@@ -41,7 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Do what is not done yet; returns 0, or 1 where tasks failed."""
     from greybed.core.errors import InputError
-    from greybed.core.files import output_folder, sole_writer, write_summary
+    from greybed.core.files import write_summary
+    from greybed.core.folder_lock import locked_folder
     from greybed.core.processors import available_threads
     from greybed.core.progress import progress
     from greybed.datasets.campaign import run_campaign
@@ -53,20 +55,19 @@ def run(options: argparse.Namespace) -> int:
     if options.workers is not None and options.scheduler not in (None, "local"):
         raise InputError("--workers is for this machine only; leave it out beside --scheduler.")
     cases = cases_of(options.file)
-    folder = output_folder(options.out)
-    workers = options.workers or available_threads()
-    with (
-        sole_writer(folder / ".campaign.lock"),
-        executor_of(options.scheduler, workers) as executor,
-        progress(len(cases), "cases", show=not options.quiet) as advance,
-    ):
-        campaign = run_campaign(simulate_case, cases, folder / "tasks", executor, advance)
-    write_table(campaign, cases, folder / "campaign.csv")
-    results = {
-        "cases": len(campaign.keys), "found_from_before": campaign.found,
-        "failed": campaign.failed, "scheduler": options.scheduler,
-    }  # fmt: skip
-    summary = write_summary(folder, "campaign", results, options.file)
+    with locked_folder(options.out) as folder:
+        workers = options.workers or available_threads()
+        with (
+            executor_of(options.scheduler, workers) as executor,
+            progress(len(cases), "cases", show=not options.quiet) as advance,
+        ):
+            campaign = run_campaign(simulate_case, cases, folder / "tasks", executor, advance)
+        write_table(campaign, cases, folder / "campaign.csv")
+        results = {
+            "cases": len(campaign.keys), "found_from_before": campaign.found,
+            "failed": campaign.failed, "scheduler": options.scheduler,
+        }  # fmt: skip
+        summary = write_summary(folder, "campaign", results, options.file)
     print(
         f"{len(campaign.keys)} cases: {campaign.found} were done before, "
         f"{len(campaign.keys) - campaign.found - len(campaign.failed)} done now, "

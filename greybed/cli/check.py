@@ -1,8 +1,8 @@
 """Check a closure: limiting cases, golden rows, hash, and the ranges it was trained for.
 
 Examples:
-  greybed check bed.closure
   greybed check shipped:viewfactor_mlp_pencil
+  greybed check bed.closure
   greybed check bed.closure --exported cpp,onnx --out runs/check
   greybed check drag.closure                       # filtered drag: fraction kept
 
@@ -111,6 +111,7 @@ def run(options: argparse.Namespace) -> int:
     from greybed.closures.viewfactor.limits import check_limits
     from greybed.core import VerificationError
     from greybed.core.files import output_folder, write_summary
+    from greybed.core.folder_lock import locked_folder
 
     out = output_folder(options.out) if options.out else None
     file = model_path(options.model)
@@ -150,6 +151,7 @@ def run(options: argparse.Namespace) -> int:
         results["exported"][target] = {"limiting_cases": _plain(found["cases"]), **rows}
     results["passed"] = passed
     if out is not None:
-        print(f"wrote {write_summary(out, 'check', results, file)}")
+        with locked_folder(out):
+            print(f"wrote {write_summary(out, 'check', results, file)}")
     print("all hold" if passed else "a check FAILED")
     return 0 if passed else 1

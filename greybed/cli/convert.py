@@ -1,6 +1,7 @@
 """Convert a packing: dump, CSV, HDF5 or legacy VTK in; CSV, HDF5, VTU or a mesh out.
 
-Example:
+Examples:
+  greybed convert greybed/datasets/packings/settled_mono_4k.dump runs/bed.vtu
   greybed convert bed.dump bed.vtu --length-unit mm
 """
 

@@ -1,8 +1,8 @@
 """Make a data set for training: traced packings, or filtered flows of gas and particles.
 
 Examples:
-  greybed dataset viewfactor --out runs/viewfactor.h5
-  greybed dataset viewfactor design.toml --out runs/viewfactor.h5 --workers 2
+  greybed dataset viewfactor examples/viewfactor/small.toml --out runs/small.h5
+  greybed dataset viewfactor --out runs/viewfactor.h5 --workers 2
   greybed dataset drag examples/filtered_drag/small.toml --out runs/drag.h5
   greybed dataset drag examples/filtered_drag/default.toml --out runs/drag.h5 --minutes 60
 
@@ -66,7 +66,8 @@ def run(options: argparse.Namespace) -> int:
     from dataclasses import replace
 
     from greybed.core.config import read_case
-    from greybed.core.files import output_folder, sole_writer, writable_file, write_summary
+    from greybed.core.files import writable_file, write_summary
+    from greybed.core.folder_lock import locked_folder
     from greybed.datasets.beds import SPLITS
     from greybed.datasets.viewfactor import Design, default_design, generate
 
@@ -74,25 +75,24 @@ def run(options: argparse.Namespace) -> int:
     if options.seed is not None:
         design = replace(design, seed=options.seed)
     target = writable_file(options.out)
-    output_folder(target.parent)
-    begin = time.perf_counter()
-    with sole_writer(target.with_name(f".{target.name}.lock")):
+    with locked_folder(target.parent):
+        begin = time.perf_counter()
         data = generate(design, target, workers=options.workers, show_progress=True)
-    splits = {s: sum(p["split"] == s for p in data.packings) for s in SPLITS}
-    inputs = [options.design] if options.design else []
-    write_summary(
-        target.parent,
-        "dataset viewfactor",
-        {
-            "file": target.name,
-            "rows": len(data),
-            "packings": splits,
-            "data_sha256": data.digest,
-            "seconds": time.perf_counter() - begin,
-        },
-        *inputs,
-        seed=design.seed,
-    )
+        splits = {s: sum(p["split"] == s for p in data.packings) for s in SPLITS}
+        inputs = [options.design] if options.design else []
+        write_summary(
+            target.parent,
+            "dataset viewfactor",
+            {
+                "file": target.name,
+                "rows": len(data),
+                "packings": splits,
+                "data_sha256": data.digest,
+                "seconds": time.perf_counter() - begin,
+            },
+            *inputs,
+            seed=design.seed,
+        )
     print(f"{target}: {len(data)} pairs of {len(data.packings)} packings {splits}")
     print(f"next: greybed train viewfactor {target} --out {target.parent}")
     return 0

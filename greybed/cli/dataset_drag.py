@@ -12,6 +12,7 @@ def run_drag(options: argparse.Namespace) -> int:
     from greybed.core.config import read_case
     from greybed.core.errors import InputError
     from greybed.core.files import output_folder, writable_file, write_summary
+    from greybed.core.folder_lock import locked_folder
     from greybed.datasets.drag_campaign import generate
     from greybed.datasets.drag_design import DragDesign
     from greybed.datasets.filtered_drag import write_filtered_drag
@@ -45,10 +46,13 @@ def run_drag(options: argparse.Namespace) -> int:
         "data_sha256": None if data is None else data.digest,
         "seconds": time.perf_counter() - begin,
     }
+    # Processes that share the cases may end together: each waits for its turn to write.
+    with locked_folder(target.parent, patience=60.0):
+        if data is not None:
+            write_filtered_drag(target, data)
+        write_summary(target.parent, "dataset drag", found, options.design)
     if data is not None:
-        write_filtered_drag(target, data)
         print(f"{target}: {found['rows']} rows of {len(data.cases)} cases")
-    write_summary(target.parent, "dataset drag", found, options.design)
     if left:
         print(f"not finished: {', '.join(left)}; the same command goes on with them")
     else:

@@ -22,26 +22,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Diagnose the study that ``options`` names; returns 0 whatever the verdict."""
     # Loaded here so that --help answers at once.
-    from greybed.core.files import output_folder, write_summary
+    from greybed.core.files import write_summary
+    from greybed.core.folder_lock import locked_folder
     from greybed.report.diagnosis import write_page
     from greybed.residual import diagnose, read_study
     from greybed.residual.output import write_diagnosis
 
     study = read_study(options.study)
-    folder = output_folder(options.out)
-    found = diagnose(study, show=not options.quiet)
-    write_diagnosis(folder, study, found)
-    write_page(study, found, folder / "report.html")
-    inputs = [options.study] + ([study.table.file] if study.table.file else [])
-    results = {
-        "verdict": found.verdict,
-        "sentence": found.sentence,
-        "effects": {e.name: e.amplitude for e in found.effects},
-        "error_before": found.error.base.value,
-        "error_after": found.error.with_effect.value,
-        "seconds": found.seconds,
-    }
-    write_summary(folder, "diagnose", results, *inputs, seed=study.options.seed)
+    with locked_folder(options.out) as folder:
+        found = diagnose(study, show=not options.quiet)
+        write_diagnosis(folder, study, found)
+        write_page(study, found, folder / "report.html")
+        inputs = [options.study] + ([study.table.file] if study.table.file else [])
+        results = {
+            "verdict": found.verdict,
+            "sentence": found.sentence,
+            "effects": {e.name: e.amplitude for e in found.effects},
+            "error_before": found.error.base.value,
+            "error_after": found.error.with_effect.value,
+            "seconds": found.seconds,
+        }
+        write_summary(folder, "diagnose", results, *inputs, seed=study.options.seed)
 
     print(f"{found.verdict}: {found.sentence}")
     for effect in found.effects:

@@ -35,9 +35,11 @@ def run(options: argparse.Namespace) -> int:
     else:
         print("All that greybed needs is here; what has a dash is optional.")
     if options.out:
-        from greybed.core.files import output_folder, write_summary
+        from greybed.core.files import write_summary
+        from greybed.core.folder_lock import locked_folder
 
         checks = {title: [f.as_dict() for f in found] for title, found in groups.items()}
         results = {"checks": checks, "broken": broken}
-        print(f"wrote {write_summary(output_folder(options.out), 'doctor', results)}")
+        with locked_folder(options.out) as folder:
+            print(f"wrote {write_summary(folder, 'doctor', results)}")
     return 1 if broken else 0

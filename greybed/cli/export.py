@@ -1,8 +1,8 @@
 """Export a closure to C++ or ONNX, and replay its golden rows there before anything is written.
 
 Examples:
-  greybed export bed.closure --to cpp --out runs/host
-  greybed export bed.closure --to cpp,onnx --name bed_radiation --out runs/host
+  greybed export shipped:viewfactor_mlp_pencil --to cpp,onnx --out runs/host
+  greybed export bed.closure --to cpp --name bed_radiation --out runs/host
   greybed export bed.closure --to cpp,c,fortran,onnx --out runs/host
 
 cpp: NAME.hpp (one header, C++11), NAME_test.cpp, CMakeLists.txt, README.md; c: also NAME_c.h and
@@ -131,45 +131,48 @@ def run(options: argparse.Namespace) -> int:
 
     from greybed.closures import content_hash, load_any, model_path
     from greybed.closures.term import GreyBoxTerm, is_term, load_term
-    from greybed.core.files import atomic_path, output_folder, write_summary
+    from greybed.core.files import atomic_path, write_summary
+    from greybed.core.folder_lock import locked_folder
 
     model = model_path(options.model)
     subject: Closure | GreyBoxTerm = load_term(model) if is_term(model) else load_any(model)
-    folder = output_folder(options.out)
-    results: dict[str, Any] = {}
-    # Files reach their place only after the replay: a header that computes wrongly is never seen.
-    with tempfile.TemporaryDirectory(dir=folder, prefix=".export-") as name:
-        workplace = Path(name)
-        for target in options.to:
-            result = _replayed(subject, target, workplace, options.name)
-            results[target] = result
-            if result["passed"] is None:
-                print(f"{target}: golden rows not replayed ({result['reason']})")
-                continue
-            print(
-                f"{target}: {result['rows'] - result['failing_rows']} of {result['rows']} golden "
-                f"rows replayed, largest relative error {result['max_relative_error']:.1e} "
-                f"(at most {result['tolerance']:g})"
-            )
-            if not result["passed"]:
+    with locked_folder(options.out) as folder:
+        results: dict[str, Any] = {}
+        # Files reach their place only after the replay: what computes wrongly is never seen.
+        with tempfile.TemporaryDirectory(dir=folder, prefix=".export-") as name:
+            workplace = Path(name)
+            for target in options.to:
+                result = _replayed(subject, target, workplace, options.name)
+                results[target] = result
+                if result["passed"] is None:
+                    print(f"{target}: golden rows not replayed ({result['reason']})")
+                    continue
                 print(
-                    f"{target}: refused, nothing written: {result['failing_rows']} rows and "
-                    f"{result.get('self_test', 0)} of the header's own checks fail; try another "
-                    "compiler in CXX, or train the closure again."
+                    f"{target}: {result['rows'] - result['failing_rows']} of {result['rows']} "
+                    f"golden rows replayed, largest relative error "
+                    f"{result['max_relative_error']:.1e} (at most {result['tolerance']:g})"
                 )
-                return 1
-        files = sorted(path.name for path in workplace.iterdir())
+                if not result["passed"]:
+                    print(
+                        f"{target}: refused, nothing written: {result['failing_rows']} rows and "
+                        f"{result.get('self_test', 0)} of the header's own checks fail; try "
+                        "another compiler in CXX, or train the closure again."
+                    )
+                    return 1
+            files = sorted(path.name for path in workplace.iterdir())
+            for file in files:
+                with atomic_path(folder / file) as temporary:
+                    os.replace(workplace / file, temporary)
+        sealed = (
+            subject.content_hash() if isinstance(subject, GreyBoxTerm) else content_hash(subject)
+        )
+        summary = write_summary(
+            folder,
+            "export",
+            {"hash": sealed, "files": files, "targets": results},
+            model,
+        )
         for file in files:
-            with atomic_path(folder / file) as temporary:
-                os.replace(workplace / file, temporary)
-    sealed = subject.content_hash() if isinstance(subject, GreyBoxTerm) else content_hash(subject)
-    summary = write_summary(
-        folder,
-        "export",
-        {"hash": sealed, "files": files, "targets": results},
-        model,
-    )
-    for file in files:
-        print(f"wrote {folder / file}")
-    print(f"wrote {summary}")
-    return 0
+            print(f"wrote {folder / file}")
+        print(f"wrote {summary}")
+        return 0

@@ -1,6 +1,7 @@
 """Put a closure into another engine: generate an adapter, build it there, run it.
 
 Examples:
+  greybed host lammps shipped:filtered_drag_mlp_plain --out runs/lammps
   greybed host lammps shipped:filtered_drag_mlp_plain --out runs/lammps --build --run --ranks 2
   greybed host liggghts shipped:viewfactor_mlp_pencil --out runs/liggghts --build
   greybed host openfoam law:wen-yu --out runs/openfoam --build --run
@@ -40,7 +41,8 @@ def run(options: argparse.Namespace) -> int:
     from importlib import import_module
 
     from greybed.core.errors import InputError
-    from greybed.core.files import output_folder, write_summary
+    from greybed.core.files import write_summary
+    from greybed.core.folder_lock import locked_folder
     from greybed.hosts import host_model
 
     if options.ranks is not None and not options.run:
@@ -53,24 +55,24 @@ def run(options: argparse.Namespace) -> int:
             "--build and --run."
         )
     model = host_model(options.model, options.law, options.name)
-    folder = output_folder(options.out)
-    files = host.generate(model, folder)
-    for file in files:
-        print(f"wrote {folder / file}")
-    results = {
-        "engine": options.engine, "model": model.text, "hash": model.hash, "law": model.law,
-        "files": files,
-    }  # fmt: skip
-    print(f"model: {model.text}, hash {model.hash}")
-    if options.build:
-        results["seconds_build"] = host.build(folder)
-        print(f"built in {results['seconds_build']:.1f} s")
-    if options.run:
-        ranks = 1 if options.ranks is None else options.ranks
-        results |= {"ranks": ranks, "seconds_run": host.run(folder, ranks)}
-        print(f"ran on {ranks} ranks in {results['seconds_run']:.1f} s")
-        results["said"] = host.said(folder)
-        for line in results["said"]:
-            print(line)
-    print(f"wrote {write_summary(folder, 'host', results)}")
-    return 0
+    with locked_folder(options.out) as folder:
+        files = host.generate(model, folder)
+        for file in files:
+            print(f"wrote {folder / file}")
+        results = {
+            "engine": options.engine, "model": model.text, "hash": model.hash, "law": model.law,
+            "files": files,
+        }  # fmt: skip
+        print(f"model: {model.text}, hash {model.hash}")
+        if options.build:
+            results["seconds_build"] = host.build(folder)
+            print(f"built in {results['seconds_build']:.1f} s")
+        if options.run:
+            ranks = 1 if options.ranks is None else options.ranks
+            results |= {"ranks": ranks, "seconds_run": host.run(folder, ranks)}
+            print(f"ran on {ranks} ranks in {results['seconds_run']:.1f} s")
+            results["said"] = host.said(folder)
+            for line in results["said"]:
+                print(line)
+        print(f"wrote {write_summary(folder, 'host', results)}")
+        return 0

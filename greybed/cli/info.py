@@ -1,7 +1,8 @@
 """Describe a packing (spheres, radii, box, walls, overlaps, coordination) or a closure (its card).
 
 Examples:
-  greybed info bed.dump --out runs/bed
+  greybed info greybed/datasets/packings/settled_mono_4k.dump
+  greybed info bed.csv --out runs/bed
   greybed info shipped:viewfactor_mlp_pencil
 """
 
@@ -149,8 +150,10 @@ def run(options: argparse.Namespace) -> int:
         results = describe(read_input(options))
         print(report(results, str(file)))
     if options.out:
-        from greybed.core.files import output_folder, write_summary
+        from greybed.core.files import write_summary
+        from greybed.core.folder_lock import locked_folder
 
-        summary = write_summary(output_folder(options.out), "info", results, file)
+        with locked_folder(options.out) as folder:
+            summary = write_summary(folder, "info", results, file)
         print(f"wrote {summary}")
     return 0

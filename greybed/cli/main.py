@@ -34,6 +34,7 @@ VERBS = {
     "diagnose": ("diagnose", "trace a residual to the effect that a model lacks"),
     "blindtest": ("blindtest", "test the residual analysis on sealed data sets"),
     "doctor": ("doctor", "check the installation, compilers and engines"),
+    "completion": ("completion", "print completion for bash, zsh or fish"),
 }
 
 

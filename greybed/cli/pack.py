@@ -1,7 +1,7 @@
 """Generate a random packing of spheres at an exact solid fraction, without overlaps.
 
 Examples:
-  greybed pack --count 10000 --fraction 0.55 --sizes mono:1.5mm --out runs/bed.h5
+  greybed pack --count 500 --fraction 0.5 --sizes mono:1.5mm --seed 1 --out runs/bed.h5
   greybed pack --count 4000 --fraction 0.58 --sizes discrete:1mm=0.3,1.5mm=0.35,2mm=0.35 \\
       --container cylinder --container-radius 30mm --seed 7 --out runs/column
 
@@ -99,7 +99,8 @@ def run(options: argparse.Namespace) -> int:
     from time import perf_counter
 
     from greybed.cli.info import describe
-    from greybed.core.files import output_folder, write_summary
+    from greybed.core.files import write_summary
+    from greybed.core.folder_lock import locked_folder
     from greybed.core.sizes import parse_sizes
     from greybed.core.writers import keeps_surroundings, write_packing
     from greybed.datasets.containers import solid_fraction_between_walls, wall_overlap
@@ -108,33 +109,33 @@ def run(options: argparse.Namespace) -> int:
     sizes = parse_sizes(options.sizes)
     container = _container(options.container, options.container_radius)
     target = _target(options.out)
-    folder = output_folder(target.parent)
-    begin = perf_counter()
-    packing = random_packing(
-        options.count,
-        options.fraction,
-        sizes,
-        container=container,
-        seed=options.seed,
-        shake=options.shake,
-        show_progress=True,
-    )
-    seconds = perf_counter() - begin
-    measured = describe(packing)
-    results = {
-        "file": target.name,
-        "sizes": options.sizes,
-        "container": options.container,
-        "shake_sweeps": options.shake,
-        "solid_fraction_requested": options.fraction,
-        "solid_fraction_reached": solid_fraction_between_walls(packing),
-        "largest_wall_overlap_relative": wall_overlap(packing),
-        "contacts": round(0.5 * measured["coordination_mean"] * len(packing)),
-        "seconds": seconds,
-        **measured,
-    }
-    write_packing(packing, target)
-    summary = write_summary(folder, "pack", results, seed=options.seed)
+    with locked_folder(target.parent) as folder:
+        begin = perf_counter()
+        packing = random_packing(
+            options.count,
+            options.fraction,
+            sizes,
+            container=container,
+            seed=options.seed,
+            shake=options.shake,
+            show_progress=True,
+        )
+        seconds = perf_counter() - begin
+        measured = describe(packing)
+        results = {
+            "file": target.name,
+            "sizes": options.sizes,
+            "container": options.container,
+            "shake_sweeps": options.shake,
+            "solid_fraction_requested": options.fraction,
+            "solid_fraction_reached": solid_fraction_between_walls(packing),
+            "largest_wall_overlap_relative": wall_overlap(packing),
+            "contacts": round(0.5 * measured["coordination_mean"] * len(packing)),
+            "seconds": seconds,
+            **measured,
+        }
+        write_packing(packing, target)
+        summary = write_summary(folder, "pack", results, seed=options.seed)
     print(
         f"{len(packing)} spheres, solid fraction {results['solid_fraction_reached']:.6f}, "
         f"{measured['overlapping_pairs']} overlaps, coordination "

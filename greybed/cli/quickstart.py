@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the chain and print the limiting cases."""
     from greybed.core import InputError
-    from greybed.core.files import output_folder, sole_writer
+    from greybed.core.folder_lock import locked_folder
     from greybed.datasets.viewfactor import MOST_SEED
     from greybed.report.quickstart import quickstart
 
@@ -35,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
         raise InputError(
             f"--seed = {options.seed} must be at least 0 and at most {MOST_SEED}; mend it."
         )
-    with sole_writer(output_folder(options.out) / ".state.lock"):
+    with locked_folder(options.out):
         results = quickstart(options.out, seed=options.seed, small=options.small)
     width = max(len(row["case"]) for row in results["limits"])
     print(f"\n{'limiting case':<{width}}  {'largest deviation':>17}  bound")

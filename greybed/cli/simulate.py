@@ -28,7 +28,8 @@ from greybed.cli.simulate_flow import run_flow
 from greybed.cli.simulate_particles import run_particles
 from greybed.core.config import read_toml
 from greybed.core.errors import InputError
-from greybed.core.files import atomic_path, output_folder, write_summary
+from greybed.core.files import atomic_path, write_summary
+from greybed.core.folder_lock import locked_folder
 from greybed.core.packing import Packing
 from greybed.core.progress import progress
 
@@ -89,32 +90,32 @@ def run(options: argparse.Namespace) -> int:
     if options.movie:
         raise InputError("--movie is for particles and flows only; leave it out.")
     case = load_case(options.case)
-    folder = output_folder(options.out)
-    packing = read_packing(case.packing.file, walls=case.walls)
-    show = not options.quiet
-    rows = view_factors(case, packing, threads=options.threads, show=show)
-    transient = case.solve.mode == "transient"
-    with progress(TICKS, "heating", show=show and transient) as advance:
-        done = 0.0
+    with locked_folder(options.out) as folder:
+        packing = read_packing(case.packing.file, walls=case.walls)
+        show = not options.quiet
+        rows = view_factors(case, packing, threads=options.threads, show=show)
+        transient = case.solve.mode == "transient"
+        with progress(TICKS, "heating", show=show and transient) as advance:
+            done = 0.0
 
-        def on_progress(fraction: float) -> None:
-            nonlocal done
-            before, done = done, done + fraction
-            advance(round(done * TICKS) - round(before * TICKS))
+            def on_progress(fraction: float) -> None:
+                nonlocal done
+                before, done = done, done + fraction
+                advance(round(done * TICKS) - round(before * TICKS))
 
-        bed, result = run_case(case, packing, rows, on_progress=on_progress)
+            bed, result = run_case(case, packing, rows, on_progress=on_progress)
 
-    inputs = [options.case, case.packing.file]
-    inputs += [wall.file for wall in case.wall if isinstance(wall, MeshTable)]
-    if case.radiation.closure is not None:
-        inputs.append(case.radiation.closure)
-    _write_temperatures(folder / "temperatures.csv", packing, result.temperatures)
-    write_packing(packing, folder / "bed.vtu", fields={"temperature [K]": result.temperatures})
-    if transient:
-        names = [w.name for w in case.wall]
-        _write_history(folder / "history.csv", result.history, names)
-    results = summary(case, bed, result)
-    write_summary(folder, "simulate", results, *inputs, seed=case.radiation.seed)
+        inputs = [options.case, case.packing.file]
+        inputs += [wall.file for wall in case.wall if isinstance(wall, MeshTable)]
+        if case.radiation.closure is not None:
+            inputs.append(case.radiation.closure)
+        _write_temperatures(folder / "temperatures.csv", packing, result.temperatures)
+        write_packing(packing, folder / "bed.vtu", fields={"temperature [K]": result.temperatures})
+        if transient:
+            names = [w.name for w in case.wall]
+            _write_history(folder / "history.csv", result.history, names)
+        results = summary(case, bed, result)
+        write_summary(folder, "simulate", results, *inputs, seed=case.radiation.seed)
 
     print(f"{len(packing)} spheres, {results['status']}")
     t = result.temperatures

@@ -23,7 +23,7 @@ from greybed.cli.simulate_particles import (
 def run_engine(options: argparse.Namespace) -> int:
     """Run the case that ``options`` names; returns 0."""
     from greybed.core.errors import InputError
-    from greybed.core.files import output_folder, sole_writer
+    from greybed.core.folder_lock import locked_folder
     from greybed.core.progress import progress
     from greybed.core.readers import read_packing
     from greybed.core.writers.history import write_history
@@ -36,9 +36,8 @@ def run_engine(options: argparse.Namespace) -> int:
         raise InputError("--fix needs the plugin that has it; give --plugin FILE, or leave it out.")
     case = load_particle_case(options.case)
     files, inputs = files_of(case, options.case)
-    folder = output_folder(options.out)
     ranks = 1 if options.ranks is None else options.ranks
-    with sole_writer(folder / ".simulate.lock"), _ended_by_signal():
+    with locked_folder(options.out) as folder, _ended_by_signal():
         packings = {k: read_packing(path) for k, path in files.items()}
         try:
             work = folder / options.engine

@@ -15,16 +15,16 @@ TICKS = 1000  # of the progress bar
 
 def run_flow(options: argparse.Namespace, kind: str) -> int:
     """Run the case of the kind ``two-fluid`` or ``gas`` that ``options`` name; returns 0."""
-    from greybed.core.files import output_folder, sha256_of, sole_writer, write_summary
+    from greybed.core.files import sha256_of, write_summary
+    from greybed.core.folder_lock import locked_folder
     from greybed.core.progress import progress
     from greybed.core.writers.history import write_history
     from greybed.coupling.flow_run import FlowRun
 
     case, flow, names = _made(options, kind)
     key = sha256_of(options.case)
-    folder = output_folder(options.out)
-    checkpoint = folder / CHECKPOINT
-    with sole_writer(folder / ".simulate.lock"):
+    with locked_folder(options.out) as folder:
+        checkpoint = folder / CHECKPOINT
         run = FlowRun(case, flow)
         found = flow.steps if run.restore(checkpoint, key) else 0
         frames = _Frames(run, folder, options.movie, names[0])

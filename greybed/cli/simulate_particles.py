@@ -21,7 +21,8 @@ def run_particles(options: argparse.Namespace, *, gas: bool = False) -> int:
     With ``gas`` it is one of particles in a gas.
     """
     from greybed.core.errors import InputError
-    from greybed.core.files import output_folder, sha256_of, sole_writer
+    from greybed.core.files import sha256_of
+    from greybed.core.folder_lock import locked_folder
     from greybed.core.progress import progress
     from greybed.core.readers import read_packing
     from greybed.core.writers.history import write_history
@@ -43,9 +44,8 @@ def run_particles(options: argparse.Namespace, *, gas: bool = False) -> int:
         case, kind, shown = load_particle_case(options.case), ParticleRun, Frames
     files, inputs = files_of(case, options.case)
     key = "".join(sha256_of(path) for path in inputs)
-    folder = output_folder(options.out)
-    checkpoint = folder / CHECKPOINT
-    with sole_writer(folder / ".simulate.lock"):
+    with locked_folder(options.out) as folder:
+        checkpoint = folder / CHECKPOINT
         packings = {k: read_packing(path) for k, path in files.items()}
         try:
             run = kind(case, packings, threads=options.threads)

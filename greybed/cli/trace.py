@@ -1,7 +1,7 @@
 """Ray trace a packing: view factors of every sphere to spheres and walls, each with its error.
 
 Examples:
-  greybed trace greybed/datasets/packings/settled_mono_4k.dump --rays 10000 --out runs/trace
+  greybed trace greybed/datasets/packings/settled_mono_4k.dump --rays 2000 --out runs/traced
   greybed trace bed.csv --wall plane:0,0,0:0,0,1 --wall cylinder:0,0,0:0,0,1:30mm --out runs/trace
   greybed trace bed.csv --wall mesh:oven.stl:mm --wall disc:0,0,0:0,0,1:30mm --out runs/trace
   greybed trace bed.csv --emissivity 0.3,0.8 --out runs/exchange
@@ -131,13 +131,14 @@ def summarise(packing: Packing, blocks: Sequence[Block], rays: int, seed: int) -
 def run(options: argparse.Namespace) -> int:
     """Trace the packing and write its view factors and their summary."""
     from greybed.core.errors import InputError
-    from greybed.core.files import output_folder, sole_writer, write_summary
+    from greybed.core.files import write_summary
+    from greybed.core.folder_lock import locked_folder
     from greybed.core.processors import available_threads
     from greybed.core.readers import read_packing
     from greybed.core.units import parse_quantity
     from greybed.datasets.exchanging import forget_blocks
     from greybed.datasets.factors_file import block_of, write_factors
-    from greybed.datasets.tracing import STATE, Settings, trace_in_blocks
+    from greybed.datasets.tracing import Settings, trace_in_blocks
     from greybed.raytrace import smoothed, view_factors
 
     if options.rel_error is not None and (options.workers or options.scheduler):
@@ -154,9 +155,8 @@ def run(options: argparse.Namespace) -> int:
         limit = parse_quantity(options.max_distance, "length", "--max-distance")
     packing = read_packing(options.file, walls, frame=options.frame, unit=options.length_unit)
     n = len(packing)
-    folder = output_folder(options.out)
-    path = folder / FILE
-    with sole_writer(folder / f"{STATE}.lock"):
+    with locked_folder(options.out) as folder:
+        path = folder / FILE
         if options.emissivity is not None:
             results, found, path = run_exchange(options, packing, folder, limit)
             summary = write_summary(folder, "trace", results, options.file, seed=options.seed)

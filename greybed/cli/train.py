@@ -1,8 +1,9 @@
 """Train a closure from a data set and score it on packings, or cases, that it has not seen.
 
 Examples:
+  greybed train viewfactor runs/small.h5 --model forest --out runs/forest
   greybed train viewfactor runs/viewfactor.h5 --model mlp --out runs
-  greybed train drag runs/filtered_drag.h5 --markers gradient --out runs
+  greybed train drag greybed/datasets/filtered_drag.h5 --markers full --out runs
 
 Writes NAME.closure (one file: weights, markers, ranges, golden rows), NAME.html (errors,
 calibration, learning curve, model card) and summary.json. The exit code is 1 if a limiting case
@@ -75,7 +76,8 @@ def run(options: argparse.Namespace) -> int:
     from greybed.closures.viewfactor import MARKER_SETS
     from greybed.closures.viewfactor.limits import check_limits
     from greybed.core import InputError
-    from greybed.core.files import output_folder, writable_file, write_summary
+    from greybed.core.files import writable_file, write_summary
+    from greybed.core.folder_lock import locked_folder
     from greybed.datasets.viewfactor import read
     from greybed.report.model import render_model
     from greybed.training import learning_curve, train
@@ -98,41 +100,42 @@ def run(options: argparse.Namespace) -> int:
     name = name_of(options, quantity)
     data = read(options.data)
     # Before the work: a name that is too long, or taken by a folder.
-    target = writable_file(output_folder(options.out) / (name + SUFFIX))
-    begin = time.perf_counter()
-    try:
-        closure = train(
-            data, options.model, options.markers, seed=options.seed, epochs=options.epochs,
-            show_progress=True,
-        )  # fmt: skip
-    except InputError as error:
-        raise InputError(f"{options.data}: {error}") from None
-    seconds = time.perf_counter() - begin
-    if not options.no_curve:
-        closure.card["learning_curve"] = learning_curve(
-            data, options.model, options.markers, seed=options.seed, epochs=options.epochs
+    with locked_folder(options.out) as folder:
+        target = writable_file(folder / (name + SUFFIX))
+        begin = time.perf_counter()
+        try:
+            closure = train(
+                data, options.model, options.markers, seed=options.seed, epochs=options.epochs,
+                show_progress=True,
+            )  # fmt: skip
+        except InputError as error:
+            raise InputError(f"{options.data}: {error}") from None
+        seconds = time.perf_counter() - begin
+        if not options.no_curve:
+            closure.card["learning_curve"] = learning_curve(
+                data, options.model, options.markers, seed=options.seed, epochs=options.epochs
+            )
+        path = save(closure, target)
+        cases = check_limits(closure)
+        rows = rows_for(data, closure.markers)
+        page = render_model(closure, rows, cases, target.with_suffix(".html"), name=name)
+        score = closure.card["score"]
+        write_summary(
+            target.parent,
+            "train viewfactor",
+            {
+                "file": path.name,
+                "hash": content_hash(closure),
+                "report": page.name,
+                "score": score,
+                "regimes": closure.card["regimes"],
+                "learning_curve": closure.card.get("learning_curve", []),
+                "limits": {case.name: case.passed for case in cases},
+                "seconds": seconds,
+            },
+            options.data,
+            seed=options.seed,
         )
-    path = save(closure, target)
-    cases = check_limits(closure)
-    rows = rows_for(data, closure.markers)
-    page = render_model(closure, rows, cases, target.with_suffix(".html"), name=name)
-    score = closure.card["score"]
-    write_summary(
-        target.parent,
-        "train viewfactor",
-        {
-            "file": path.name,
-            "hash": content_hash(closure),
-            "report": page.name,
-            "score": score,
-            "regimes": closure.card["regimes"],
-            "learning_curve": closure.card.get("learning_curve", []),
-            "limits": {case.name: case.passed for case in cases},
-            "seconds": seconds,
-        },
-        options.data,
-        seed=options.seed,
-    )
     low, high = score["r2_ci95"]
     print(
         f"{path}: R2 = {score['r2']:.5f} (95 %: {low:.5f} to {high:.5f}), RMSE = "

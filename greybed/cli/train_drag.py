@@ -13,7 +13,8 @@ def run_drag(options: argparse.Namespace) -> int:
     from greybed.closures.artifact import SUFFIX
     from greybed.closures.drag.filtered.limits import check_limits
     from greybed.core import InputError
-    from greybed.core.files import output_folder, writable_file, write_summary
+    from greybed.core.files import writable_file, write_summary
+    from greybed.core.folder_lock import locked_folder
     from greybed.datasets.filtered_drag import read_filtered_drag
     from greybed.report.drag_model import render_drag_model
     from greybed.training.drag import EPOCHS, drag_curve, train_drag
@@ -22,43 +23,46 @@ def run_drag(options: argparse.Namespace) -> int:
     epochs = EPOCHS if options.epochs is None else options.epochs
     data = read_filtered_drag(options.data)
     # Before the work: a name that is too long, or taken by a folder.
-    target = writable_file(output_folder(options.out) / (name + SUFFIX))
-    begin = time.perf_counter()
-    try:
-        closure, rows, forces = train_drag(
-            data, options.model, options.markers, seed=options.seed, epochs=epochs,
-            show_progress=True,
-        )  # fmt: skip
-    except InputError as error:
-        raise InputError(f"{options.data}: {error}") from None
-    seconds = time.perf_counter() - begin
-    if not options.no_curve:
-        closure.card["learning_curve"] = drag_curve(
-            data, options.model, options.markers, seed=options.seed, epochs=epochs
+    with locked_folder(options.out) as folder:
+        target = writable_file(folder / (name + SUFFIX))
+        begin = time.perf_counter()
+        try:
+            closure, rows, forces = train_drag(
+                data, options.model, options.markers, seed=options.seed, epochs=epochs,
+                show_progress=True,
+            )  # fmt: skip
+        except InputError as error:
+            raise InputError(f"{options.data}: {error}") from None
+        seconds = time.perf_counter() - begin
+        if not options.no_curve:
+            closure.card["learning_curve"] = drag_curve(
+                data, options.model, options.markers, seed=options.seed, epochs=epochs
+            )
+        path = save(closure, target)
+        cases = check_limits(closure, n=1_000_000)
+        page = render_drag_model(
+            closure, rows, forces, cases, target.with_suffix(".html"), name=name
         )
-    path = save(closure, target)
-    cases = check_limits(closure, n=1_000_000)
-    page = render_drag_model(closure, rows, forces, cases, target.with_suffix(".html"), name=name)
-    card = closure.card
-    write_summary(
-        target.parent,
-        "train drag",
-        {
-            "file": path.name,
-            "hash": content_hash(closure),
-            "report": page.name,
-            "convention": card["convention"],
-            "score": card["score"],
-            "random_rows": card.get("random_rows", {}),
-            "guesses": card["guesses"],
-            "by_case": card["by_case"],
-            "learning_curve": card.get("learning_curve", []),
-            "limits": {case.name: case.passed for case in cases},
-            "seconds": seconds,
-        },
-        options.data,
-        seed=options.seed,
-    )
+        card = closure.card
+        write_summary(
+            target.parent,
+            "train drag",
+            {
+                "file": path.name,
+                "hash": content_hash(closure),
+                "report": page.name,
+                "convention": card["convention"],
+                "score": card["score"],
+                "random_rows": card.get("random_rows", {}),
+                "guesses": card["guesses"],
+                "by_case": card["by_case"],
+                "learning_curve": card.get("learning_curve", []),
+                "limits": {case.name: case.passed for case in cases},
+                "seconds": seconds,
+            },
+            options.data,
+            seed=options.seed,
+        )
     score = card["score"]
     print(
         f"{path}: fraction kept of drag, R2 of the drift flux = {score['drift_r2']:.3f}, of H = "

@@ -23,7 +23,7 @@ from greybed.closures.drag.filtered import limits as drag_limits
 from greybed.closures.drag.filtered.closure import QUANTITY, FilteredDragClosure
 from greybed.closures.drag.filtered.features import MARKER_SETS as DRAG_MARKER_SETS
 from greybed.closures.drag.filtered.gate import Gate
-from greybed.closures.predictors import PREDICTORS
+from greybed.closures.predictors import PREDICTORS, Forest
 from greybed.closures.viewfactor.closure import Domain, ViewFactorClosure
 from greybed.closures.viewfactor.limits import random_markers
 from greybed.closures.viewfactor.visibility import MARKER_SETS
@@ -35,6 +35,7 @@ GOLDEN_ROWS = 64
 # The same arithmetic in the same order: only the last digits of libm may differ.
 GOLDEN_TOLERANCE = 1e-12
 SUFFIX = ".closure"
+LARGEST = 1 << 30  # bytes when unpacked; a small archive may hold far more than a machine
 
 Closure = ViewFactorClosure | FilteredDragClosure
 
@@ -165,6 +166,7 @@ def load_any(path: str | os.PathLike[str]) -> Closure:
     file = Path(path)
     arrays, manifest = _unpack(file)
     try:
+        _check_numbers(arrays)
         predictor = PREDICTORS[manifest["kind"]].from_arrays(
             {k.removeprefix("predictor_"): v for k, v in arrays.items() if k[:10] == "predictor_"}
         )
@@ -177,18 +179,24 @@ def load_any(path: str | os.PathLike[str]) -> Closure:
             )  # fmt: skip
         else:
             closure = ViewFactorClosure(MARKER_SETS[manifest["markers"]], predictor, domain, card)
+        # The walk of a tree takes columns by these numbers, without looking.
+        width = len(closure.markers.feature_names)
+        if isinstance(predictor, Forest) and (predictor.feature >= width).any():
+            raise ValueError("features: a tree compares one that there is not")
         inputs, expected = arrays["golden_inputs"], arrays["golden_outputs"]
         # An artifact that is not of one piece must not get further than here.
         fits = inputs.shape[1] == len(closure.marker_names) and len(inputs) == len(expected)
-        replayed = answers(closure, inputs)
+        with np.errstate(all="ignore"):  # what is not finite is no golden row, below
+            replayed = answers(closure, inputs)
         if not fits or replayed.shape != expected.shape:
             raise ValueError("golden rows of another shape")
-    except (KeyError, IndexError, ValueError) as error:
+    except (LookupError, ValueError, TypeError, AttributeError, ArithmeticError) as error:
         raise InputError(
             f"{file}: the artifact lacks or mistakes {error}; it was written by greybed "
             f"{manifest.get('greybed', 'unknown')}, this is {__version__}: train it again."
         ) from None
-    error_ = np.abs(replayed - expected) / np.maximum(np.abs(expected), 1e-300)
+    with np.errstate(all="ignore"):
+        error_ = np.abs(replayed - expected) / np.maximum(np.abs(expected), 1e-300)
     if not (error_ <= GOLDEN_TOLERANCE).all():
         wrong = np.nan_to_num(error_, nan=np.inf)
         row = int(wrong.max(axis=1).argmax())
@@ -199,6 +207,15 @@ def load_any(path: str | os.PathLike[str]) -> Closure:
             "computes differently: reinstall numpy, or train the closure again."
         )
     return closure
+
+
+def _check_numbers(arrays: dict[str, NDArray]) -> None:
+    """Refuse text, complex numbers and what is not finite where weights and rows should be."""
+    for name, array in arrays.items():
+        if array.dtype.kind not in "fiu":
+            raise ValueError(f"array {name} of type {array.dtype}")
+        if not name.startswith("domain_") and not np.isfinite(array).all():
+            raise ValueError(f"array {name}, not all of it finite")
 
 
 def _unpack(file: Path) -> tuple[dict[str, NDArray], dict[str, Any]]:
@@ -222,10 +239,15 @@ def _unpack(file: Path) -> tuple[dict[str, NDArray], dict[str, Any]]:
             "copy it again or train it again."
         )
     try:
+        with zipfile.ZipFile(io.BytesIO(payload)) as members:
+            if sum(member.file_size for member in members.infolist()) > LARGEST:
+                raise ValueError(f"more than {LARGEST} bytes")
         with np.load(io.BytesIO(payload), allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
         manifest = json.loads(arrays.pop("manifest").tobytes())
-    except (KeyError, ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+        if not isinstance(manifest, dict):
+            raise ValueError("no manifest")
+    except Exception as error:  # what numpy and zipfile raise for damage is not documented
         raise InputError(f"{file}: the artifact cannot be unpacked ({error}); train it again.") \
             from None  # fmt: skip
     return arrays, manifest

@@ -192,8 +192,12 @@ class Forest:
     @classmethod
     def from_arrays(cls, arrays: dict[str, NDArray]) -> Forest:
         """Rebuild from :meth:`arrays`."""
-        names = ("roots", "feature", "threshold", "left", "value")
-        return cls(*(arrays[name] for name in names))
+        kinds = {"roots": "i", "feature": "i", "threshold": "f", "left": "i", "value": "f"}
+        for name, kind in kinds.items():
+            array = arrays[name]
+            if array.dtype.kind != kind or array.ndim != (2 if name == "value" else 1):
+                raise ValueError(f"array {name} of type {array.dtype}, shape {array.shape}")
+        return cls(*(arrays[name] for name in kinds))
 
     @classmethod
     def random(cls, n_features: int, trees: int = 8, seed: int = 0, outputs: int = 2) -> Forest:

@@ -145,22 +145,27 @@ def load_term(path: str | os.PathLike[str]) -> GreyBoxTerm:
     try:
         content = json.loads(Path(path).read_text())
         table = dict(content["term"])
-        table["window"] = tuple(float(x) for x in table["window"])
-        term = GreyBoxTerm(**table)
+        low, high = (float(x) for x in table["window"])
+        table |= {name: str(table[name]) for name in ("name", "covariate", "unit", "response")}
+        table |= {name: float(table[name]) for name in ("reference", "amplitude", "exponent")}
+        term = GreyBoxTerm(**{**table, "window": (low, high), "side": int(table["side"])})
         golden = content["golden"]
         values, factors = (np.array(golden[k], dtype=np.float64) for k in ("values", "factors"))
+        if values.shape != factors.shape or values.ndim != 1 or not len(values):
+            raise ValueError("golden rows of another shape")
         sealed = content["hash"]
     except OSError as error:
         reason = error.strerror or error
         raise InputError(f"{path}: cannot read this term ({reason}); check the path.") from None
     except InputError:
         raise
-    except (KeyError, TypeError, ValueError, UnicodeDecodeError) as error:
+    except (LookupError, TypeError, ValueError, ArithmeticError, RecursionError) as error:
         raise InputError(
             f"{path}: not a grey-box term ({type(error).__name__}: {error}); make one with greybed "
             "diagnose."
         ) from None
-    off = np.abs(term.evaluate(values) - factors)
+    with np.errstate(all="ignore"):  # what is not finite is no golden row
+        off = np.abs(term.evaluate(values) - factors)
     if sealed != term.content_hash() or not (off <= TOLERANCE * factors).all():
         raise VerificationError(
             f"{path}: the term was changed (its hash or its golden rows do not match); copy it "

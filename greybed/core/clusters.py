@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
+from greybed.core.config import read_toml
 from greybed.core.errors import InputError
 from greybed.core.processors import available_threads
 
@@ -81,11 +81,7 @@ def slurm_table(path: Path) -> tuple[int, dict[str, Any]]:
     InputError
         If the file cannot be read or says something else.
     """
-    try:
-        with open(path, "rb") as stream:
-            table = tomllib.load(stream)
-    except (OSError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as TOML ({error}).") from None
+    table = read_toml(path)
     jobs, slurm = table.pop("jobs", None), table.pop("slurm", None)
     if table or not isinstance(jobs, int) or jobs < 1 or not isinstance(slurm, dict):
         raise InputError(

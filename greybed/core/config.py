@@ -6,6 +6,7 @@ import dataclasses
 import difflib
 import math
 import os
+import re
 import tomllib
 import types
 from collections.abc import Mapping
@@ -16,6 +17,10 @@ from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 from greybed.core.errors import InputError
 
 T = TypeVar("T")
+LARGEST = 1 << 22  # bytes of a file; a case has a few thousand
+# Tables within tables, as dotted keys; no case has more than four, and reading so many takes time
+# that grows with their square.
+_DEEP = re.compile(rb"(?<![\w-])(?:[\"']?[\w-]++[\"']?[ \t]*+\.[ \t]*+){64}")
 
 
 def quantity(
@@ -120,11 +125,24 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
     """
     try:
         with open(path, "rb") as stream:
-            return tomllib.load(stream)
+            content = stream.read(LARGEST + 1)  # a device may never end
     except OSError as error:
         reason = error.strerror or error
         raise InputError(f"{path}: cannot read this case ({reason}); check the path.") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    if len(content) > LARGEST:
+        raise InputError(
+            f"{path}: a case of more than {LARGEST} bytes is none; give large tables as files."
+        )
+    try:
+        if _DEEP.search(content):
+            raise RecursionError
+        return tomllib.loads(content.decode())
+    except RecursionError:
+        raise InputError(
+            f"{path}: not valid TOML (lists or tables within one another without end); mend the "
+            "file."
+        ) from None
+    except ValueError as error:  # also of Unicode, and of numbers with thousands of digits
         raise InputError(f"{path}: not valid TOML ({error}); mend the file there.") from None
 
 

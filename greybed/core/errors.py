@@ -1,8 +1,16 @@
 """Errors that end in one sentence (place, value, unit, bound, remedy) and exit code 2."""
 
+# Characters of a message; what a file holds may stand in it, and may be of any length.
+LONGEST = 1500
+
 
 class GreybedError(Exception):
     """Base of every error that a user can mend; the message is one sentence with its remedy."""
+
+    def __str__(self) -> str:
+        text = " ".join(super().__str__().splitlines())
+        half = LONGEST // 2
+        return text if len(text) <= LONGEST else f"{text[:half]} ... {text[-half:]}"
 
 
 class InputError(GreybedError, ValueError):

@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import platform
+import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -61,6 +62,12 @@ def writable_file(path: str | os.PathLike[str]) -> Path:
     return target
 
 
+def reason_of(error: OSError) -> str:
+    """What the system said; the HDF5 library puts it into a page of text."""
+    told = re.search(r"error message = '([^']*)'", str(error))
+    return told[1] if told else (error.strerror or str(error))
+
+
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Give a temporary path beside ``path`` that takes its place only when the block succeeds.
@@ -75,66 +82,12 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         os.replace(temporary, target)
     except OSError as error:
         raise OutputError(
-            f"{target}: cannot write this file ({error.strerror or error}); choose another "
+            f"{target}: cannot write this file ({reason_of(error)}); choose another "
             "folder, free space, or change its permissions."
         ) from None
     finally:
         with suppress(OSError):  # no such folder, a name too long: told above
             temporary.unlink(missing_ok=True)
-
-
-@contextmanager
-def sole_writer(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Hold the lock file ``path``, so that no two runs keep their finished parts in one place.
-
-    The system frees the lock of a run that ends in whatever way: none is ever stale.
-
-    Raises
-    ------
-    OutputError
-        If another run holds it.
-    """
-    lock = Path(path)
-    try:
-        import fcntl
-    except ImportError:  # Windows: two runs at once are the user's to avoid
-        yield
-        return
-    while True:
-        try:
-            stream = open(lock, "a+")  # noqa: SIM115
-        except OSError as error:
-            raise OutputError(
-                f"{lock}: cannot write this file ({error.strerror or error}); choose another "
-                "folder, free space, or change its permissions."
-            ) from None
-        try:
-            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            stream.seek(0)
-            holder = stream.read(20).strip() or "unknown"
-            stream.close()
-            raise OutputError(
-                f"{lock.parent}: another run (process {holder}) is writing there; wait for its "
-                "end, or choose another place with --out."
-            ) from None
-        except OSError:  # a file system without locks
-            pass
-        # The holder before may have removed the file between our two calls.
-        with suppress(OSError):
-            if os.path.samestat(os.fstat(stream.fileno()), lock.stat()):
-                break
-        stream.close()
-    try:
-        with suppress(OSError):  # the number is for the message only
-            stream.truncate(0)
-            stream.write(f"{os.getpid()}\n")
-            stream.flush()
-        yield
-    finally:
-        lock.unlink(missing_ok=True)
-        with suppress(OSError):
-            stream.close()
 
 
 def sha256_of(path: str | os.PathLike[str]) -> str:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
+import signal
+import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
@@ -12,6 +15,8 @@ from multiprocessing import connection, get_context, parent_process
 from typing import Any
 
 from greybed.core.errors import OutputError
+
+_PARENT_DIES = 1  # PR_SET_PDEATHSIG
 
 
 def processes(
@@ -30,6 +35,30 @@ def processes(
 def end_with_parent() -> None:
     """End this process when its parent ends, from now on."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def ending_with_parent(number: int = signal.SIGKILL) -> Callable[[], None]:
+    """What a program calls before it starts (``preexec_fn``), so as to end when we do.
+
+    A killed run would leave it at work in a folder that the next run takes for its own. Only
+    Linux has this; elsewhere nothing is called.
+
+    Parameters
+    ----------
+    number : int
+        Signal that it gets then.
+    """
+    parent = os.getpid()
+    # Found here: between fork and exec, nothing may be loaded.
+    library = ctypes.CDLL(None) if sys.platform == "linux" else None
+
+    def before_exec() -> None:
+        if library is not None:
+            library.prctl(_PARENT_DIES, number)
+            if os.getppid() != parent:  # it has died since
+                os.kill(os.getpid(), number)
+
+    return before_exec
 
 
 def _begin(start: Callable[..., None] | None, about: tuple[Any, ...]) -> None:

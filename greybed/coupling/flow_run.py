@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from greybed.core.errors import InputError
 from greybed.core.files import atomic_path
+from greybed.core.seal import seal_of
 from greybed.coupling.flow_tables import FlowOutput, GridTable
 
 Array = NDArray[np.float64]
 
-FORMAT = "greybed-flow-1"
+FORMAT = "greybed-flow-2"
 
 
 class FlowCase(Protocol):
@@ -115,11 +116,11 @@ class FlowRun:
 
     def save(self, path: str | os.PathLike[str], key: str) -> Path:
         """Write a checkpoint, whole or not at all."""
-        numbers = json.dumps(
-            {"format": FORMAT, "key": key, "history": self.history, "done": self.done}
-        )
+        arrays = {name: np.asarray(value) for name, value in self.flow.save().items()}
+        table: dict[str, Any] = {"format": FORMAT, "key": key, "seal": seal_of(arrays)}
+        table |= {"history": self.history, "done": self.done}
         with atomic_path(path) as part, open(part, "wb") as stream:
-            np.savez(stream, allow_pickle=False, numbers=np.array(numbers), **self.flow.save())
+            np.savez(stream, allow_pickle=False, numbers=np.array(json.dumps(table)), **arrays)
         return Path(path)
 
     def restore(self, path: str | os.PathLike[str], key: str) -> bool:
@@ -131,6 +132,8 @@ class FlowRun:
             with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as stored:
                 arrays = {name: stored[name] for name in stored.files}
             numbers = json.loads(str(arrays.pop("numbers")))
+            if numbers["seal"] != seal_of(arrays):
+                return False
         except Exception:  # what numpy and zipfile raise for a cut file is not documented
             return False
         if numbers.get("format") != FORMAT or numbers.get("key") != key:

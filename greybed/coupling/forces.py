@@ -27,21 +27,22 @@ def shear_lift(slip: Array, vorticity: Array, d: Array, density: float, viscosit
     density, viscosity : float
         Of the fluid [kg/m3], [Pa s].
     """
-    size = np.sqrt((vorticity**2).sum(axis=1))
+    shear = np.sqrt((vorticity**2).sum(axis=1))
     speed = np.sqrt((slip**2).sum(axis=1))
-    moving = (size > 0.0) & (speed > 0.0)
-    safe, fast = np.where(moving, size, 1.0), np.where(moving, speed, 1.0)
+    lifted = (shear > 0.0) & (speed > 0.0)
+    # 1 where there is no lift, so that nothing is divided by 0.
+    shear_below, speed_below = np.where(lifted, shear, 1.0), np.where(lifted, speed, 1.0)
     re = density * d * speed / viscosity
-    alpha = 0.5 * d * size / fast
+    alpha = 0.5 * d * shear / speed_below
     low = (1.0 - 0.3314 * np.sqrt(alpha)) * np.exp(-0.1 * re) + 0.3314 * np.sqrt(alpha)
     correction = np.where(re <= 40.0, low, 0.0524 * np.sqrt(alpha * re))
-    strength = np.where(moving, 1.615 * d**2 * np.sqrt(density * viscosity / safe), 0.0)
+    strength = np.where(lifted, 1.615 * d**2 * np.sqrt(density * viscosity / shear_below), 0.0)
     result: Array = (strength * correction)[:, None] * np.cross(slip, vorticity)
     return result
 
 
 def added_mass(
-    coefficient: float, displaced: Array, mass: Array, known: Array, fluid_acceleration: Array
+    coefficient: float, displaced: Array, mass: Array, others: Array, fluid_acceleration: Array
 ) -> Array:
     r"""Force of the fluid that has to be pushed away, shape (n, 3) [N].
 
@@ -54,19 +55,22 @@ def added_mass(
         C, 1/2 for a sphere [-].
     displaced, mass : ndarray, shape (n,)
         Mass of the fluid displaced, and of the particles [kg].
-    known : ndarray, shape (n, 3)
-        All other forces, weight included [N].
+    others : ndarray, shape (n, 3)
+        Sum of all other forces but contacts, weight included [N].
     fluid_acceleration : ndarray, shape (n, 3)
         Du/Dt at the particles [m/s2].
     """
     extra = (coefficient * displaced)[:, None]
-    moving = (known + extra * fluid_acceleration) / (mass[:, None] + extra)
-    result: Array = extra * (fluid_acceleration - moving)
+    acceleration = (others + extra * fluid_acceleration) / (mass[:, None] + extra)
+    result: Array = extra * (fluid_acceleration - acceleration)
     return result
 
 
 def vorticity_of(velocity: Array, spacing: tuple[float, float, float]) -> Array:
-    """Curl of cell velocities (nz, ny, nx, 3), central inside and one-sided at rims [1/s]."""
+    """Curl of cell velocities (nz, ny, nx, 3), central inside and one-sided at rims [1/s].
+
+    Components and ``spacing`` [m] count x, y, z, array axes z, y, x: hence ``2 - axis``.
+    """
 
     def slope(component: int, axis: int) -> Array:
         field = velocity[..., component]

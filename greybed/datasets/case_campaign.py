@@ -17,6 +17,7 @@ import tomli_w
 from greybed.core.config import read_toml
 from greybed.core.errors import InputError
 from greybed.core.files import atomic_path, sha256_of
+from greybed.core.processes import ending_with_parent
 from greybed.datasets.campaign import Campaign
 
 # More cases than this are a slip of the pen.
@@ -90,6 +91,7 @@ def simulate_case(inputs: dict[str, Any], folder: Path) -> dict[str, Any]:
     done = subprocess.run(
         [*words, "--quiet", *inputs["words"]], capture_output=True, text=True, check=False,
         stdin=subprocess.DEVNULL, env={**os.environ, "NUMBA_NUM_THREADS": "1"},
+        preexec_fn=ending_with_parent(),
     )  # fmt: skip
     if done.returncode != 0:
         said = (done.stderr.strip() or done.stdout.strip() or "it said nothing").splitlines()[-1]

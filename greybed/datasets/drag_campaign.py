@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from greybed._version import __version__
 from greybed.core.errors import InputError
-from greybed.core.files import atomic_path, sole_writer
+from greybed.core.files import atomic_path
+from greybed.core.folder_lock import sole_writer
 from greybed.core.progress import progress
 from greybed.datasets.drag_design import DragDesign, FlowDesign
 from greybed.datasets.drag_filters import sampled

@@ -18,6 +18,7 @@ from greybed.core.errors import GreybedError, InputError
 from greybed.core.files import atomic_path
 from greybed.core.packing import Packing
 from greybed.core.readers.opening import listed, mapped, shown
+from greybed.core.writers.hdf5_stream import written_hdf5
 from greybed.datasets.factors_file import array_of, created, packing_hash, text_of
 from greybed.raytrace import ExchangeFactors, ExchangeRows, PatchExchange
 
@@ -101,7 +102,6 @@ def write_exchange(
     OutputError
         If the file cannot be written.
     """
-    import h5py
 
     n = len(packing)
     shape = results[0].wall_factors.shape
@@ -110,7 +110,7 @@ def write_exchange(
             f"{path}: exchange factors of {shape[0]} spheres and {shape[1]} walls do not belong to "
             f"{n} spheres and {packing.n_walls} walls; give the packing that was traced."
         )
-    with atomic_path(path) as part, h5py.File(part, "w", libver=("v110", "v110")) as root:
+    with atomic_path(path) as part, written_hdf5(part, libver=("v110", "v110")) as root:
         root.attrs["format"] = np.bytes_(FORMAT)
         root.attrs["version"] = VERSION
         root.attrs["greybed"] = np.bytes_(__version__)

@@ -22,6 +22,7 @@ from greybed.core.packing import Packing
 from greybed.core.readers.opening import listed, mapped, shown
 from greybed.core.records import record
 from greybed.core.walls import Cylinder, Plane, Wall
+from greybed.core.writers.hdf5_stream import written_hdf5
 from greybed.raytrace import ViewFactors
 
 FORMAT = "greybed-view-factors"
@@ -197,7 +198,6 @@ def write_blocks(
     OutputError
         If the file cannot be written.
     """
-    import h5py
 
     def rows(name: str) -> NDArray[Any]:
         return np.concatenate([block[name] for block in blocks])
@@ -206,7 +206,7 @@ def write_blocks(
     start = np.concatenate([[0], np.cumsum(lengths)])
     walls = rows("wall_factors")
     # Check sums, and texts of fixed length: see core/writers/hdf5.py.
-    with atomic_path(path) as part, h5py.File(part, "w", libver=("v110", "v110")) as root:
+    with atomic_path(path) as part, written_hdf5(part, libver=("v110", "v110")) as root:
         root.attrs["format"] = np.bytes_(FORMAT)
         root.attrs["version"] = VERSION
         root.attrs["greybed"] = np.bytes_(__version__)

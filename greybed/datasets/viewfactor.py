@@ -25,11 +25,13 @@ from greybed.core.files import atomic_path, output_folder, writable_file
 from greybed.core.processes import finished, processes
 from greybed.core.progress import progress
 from greybed.core.readers.opening import mapped, shown
+from greybed.core.writers.hdf5_stream import written_hdf5
 from greybed.datasets.beds import (
     Bed,
     as_table,
     emitters_of,
 )
+from greybed.datasets.columns import whole_column
 from greybed.datasets.designs import (
     MOST_SEED,
     Design,
@@ -304,7 +306,7 @@ def _kept(part: Path) -> dict[str, Array] | None:
 
 def write(data: ViewFactorData, design: Design, path: Path) -> None:
     """Write a data set to HDF5, every column with its unit."""
-    with atomic_path(path) as temporary, h5py.File(temporary, "w", libver="v110") as file:
+    with atomic_path(path) as temporary, written_hdf5(temporary, libver="v110") as file:
         file.attrs["format"] = np.bytes_(FORMAT)
         tables = {"packing": data.packings}
         settings = {"rays": design.rays, "emitters": design.emitters, "seed": design.seed}
@@ -350,6 +352,7 @@ def read(path: str | os.PathLike[str]) -> ViewFactorData:
             exchange = _read_rows(content["exchange"], EXCHANGE_COLUMNS)
             design = json.loads(content.attrs["design"])
             stored = content.attrs["sha256"].decode()
+            tables = design["packing"]
     except InputError:
         raise
     except Exception as error:  # what h5py raises for a damaged file is not documented
@@ -357,7 +360,6 @@ def read(path: str | os.PathLike[str]) -> ViewFactorData:
             f"{file}: cannot read this data set ({shown(str(error), 80)}); copy it or make it "
             "again."
         ) from None
-    tables = design["packing"]
     data = ViewFactorData(
         columns, packing, tables, ViewFactorData(*wall, tables), ViewFactorData(*exchange, tables)
     )
@@ -371,5 +373,8 @@ def read(path: str | os.PathLike[str]) -> ViewFactorData:
 def _read_rows(
     group: h5py.Group, names: tuple[str, ...]
 ) -> tuple[dict[str, Array], NDArray[np.int64]]:
-    columns = {name: group[name][...] for name in names}
-    return columns, group["packing"][...].astype(np.int64)
+    columns = {name: whole_column(group, name, "f") for name in names}
+    packing = whole_column(group, "packing", "i").astype(np.int64)
+    if len({len(packing), *map(len, columns.values())}) != 1:
+        raise ValueError("columns of different lengths")
+    return columns, packing

@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from greybed.core.errors import InputError
 from greybed.core.files import atomic_path
+from greybed.core.seal import seal_of
 from greybed.dem import _step
 from greybed.dem._rigid import Rigid
 from greybed.dem.lists import Lists
 from greybed.dem.simulation import Simulation
 
-FORMAT = "greybed-particles-4"
+FORMAT = "greybed-particles-5"
 
 
 def save(
@@ -57,6 +58,11 @@ def save(
         for name, value in group._asdict().items()
     }  # fmt: skip
     arrays |= {f"beside_{name}": value for name, value in (beside or {}).items()}
+    arrays |= {
+        "ident": lists.ident, "body_ident": lists.body_ident, "labels": simulation.labels,
+        "worst": lists.worst, "deepest": lists.deepest,
+    }  # fmt: skip
+    arrays = {name: np.asarray(value) for name, value in arrays.items()}
     numbers = {
         "format": FORMAT,
         "digest": _digest(simulation),
@@ -65,14 +71,11 @@ def save(
         "wall_way": lists.wall_way,
         "skin": lists.skin,
         "listed_at": lists.listed_at,
+        "seal": seal_of(arrays),
         "extra": extra,
     }
     with atomic_path(path) as part, open(part, "wb") as stream:
-        np.savez(
-            stream, allow_pickle=False, ident=lists.ident, body_ident=lists.body_ident,
-            labels=simulation.labels, worst=lists.worst, deepest=lists.deepest,
-            numbers=np.array(json.dumps(numbers)), **arrays,
-        )  # fmt: skip
+        np.savez(stream, allow_pickle=False, numbers=np.array(json.dumps(numbers)), **arrays)
     return Path(path)
 
 
@@ -99,8 +102,7 @@ def restore(simulation: Simulation, path: str | os.PathLike[str]) -> dict[str, A
     """
     try:
         with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
-        numbers = json.loads(str(arrays.pop("numbers")))
+            numbers, arrays = _unsealed(stored)
         groups: dict[str, Any] = {
             part: kind(**{name: arrays[f"{part}_{name}"] for name in kind._fields})
             for part, kind in (
@@ -139,12 +141,18 @@ def kept_with(path: str | os.PathLike[str]) -> dict[str, Any] | None:
     """What was kept beside the state of a checkpoint; None where there is no whole one."""
     try:
         with open(path, "rb") as stream, np.load(stream, allow_pickle=False) as stored:
-            numbers = json.loads(str(stored["numbers"]))
-            for name in stored.files:
-                stored[name]  # its check sum
-        return dict(numbers["extra"])
+            return dict(_unsealed(stored)[0]["extra"])
     except Exception:  # absent, cut, or of another kind
         return None
+
+
+def _unsealed(stored: Any) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    """Numbers and arrays of an open archive; ValueError where they are not what was kept."""
+    numbers: dict[str, Any] = json.loads(str(stored["numbers"]))
+    arrays = {name: stored[name] for name in stored.files if name != "numbers"}
+    if numbers["seal"] != seal_of(arrays):
+        raise ValueError("seal")
+    return numbers, arrays
 
 
 def _digest(simulation: Simulation) -> str:

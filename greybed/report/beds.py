@@ -26,7 +26,7 @@ from greybed.report.elements import (
     percent,
     table,
 )
-from greybed.report.picture import DIFFERENCE, HEAT, bed_picture, value_limits
+from greybed.report.picture import DIFFERENCE, HEAT, look_at, value_limits
 from greybed.report.sections import Results, many
 
 ZERO_CELSIUS = 273.15  # [K]
@@ -45,7 +45,8 @@ def beds_section(results: Results, arrays: Mapping[str, Mapping[str, NDArray]]) 
         a = arrays.get(f"bed_{case['bed']}")
         if a is not None and {"centres", "radii", "traced", "closure"} <= set(a):
             # A page of many beds must stay small enough to mail.
-            blocks += _bed_figures(a, width=640 if len(cases) <= 2 else 420)
+            width = 640 if len(cases) <= 2 else 420
+            blocks += _bed_figures(a, width=width // 3 if results.get("small") else width)
         blocks.append(_bed_table(case))
     return Section(
         "beds",
@@ -82,11 +83,13 @@ def _bed_figures(a: Mapping[str, NDArray], width: int) -> list[Block]:
     reach = float(np.abs(away[np.isfinite(away)]).max(initial=0.0)) or 1.0
     height = 1e3 * (packing.centres[:, 2] - packing.bounds[0][2])
 
-    def picture(values: NDArray, size: int, **options: Any) -> str:
-        return figures.png_uri(bed_picture(packing, values, width=size, **options))
+    sight = look_at(packing, width=width)
+
+    def picture(values: NDArray, **options: Any) -> str:
+        return figures.png_uri(sight.paint(values, **options))
 
     pair = tuple(
-        Figure(title, uri=picture(celsius[source], width, limits=limits))
+        Figure(title, uri=picture(celsius[source], limits=limits))
         for source, title in (
             ("traced", "With traced view factors"),
             ("closure", "With the closure"),
@@ -94,7 +97,7 @@ def _bed_figures(a: Mapping[str, NDArray], width: int) -> list[Block]:
     )
     ticks = tuple(fixed(t, 0) for t in np.linspace(*limits, 5))
     bar = ColourBar(figures.gradient(HEAT), ticks, "temperature [°C], same scale on both")
-    gap = picture(away, round(0.7 * width), limits=(-reach, reach), colours=DIFFERENCE)
+    gap = picture(away, limits=(-reach, reach), colours=DIFFERENCE)
     what = "Closure minus traced"
     compared = (
         Figure(

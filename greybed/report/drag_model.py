@@ -29,6 +29,7 @@ from greybed.report.elements import (
     percent,
     table,
 )
+from greybed.report.laws import laws_section
 from greybed.training.drag_rows import DragRows
 
 Array = NDArray[np.float64]
@@ -103,7 +104,10 @@ def render_drag_model(
             _data(rows),
             _accuracy(card, rows, forces, gap),
             *_learning(card.get("learning_curve") or ()),
-            _limits(cases),
+            laws_section(
+                cases,
+                "Largest deviation, or share of places that violate it. Nothing is clipped.",
+            ),
             _card(card, closure),
         ),
         f"greybed {card.get('greybed', '')} · seed {card.get('seed', '')} · data "
@@ -247,22 +251,6 @@ def _learning(points: Sequence[Mapping[str, Any]]) -> tuple[Section, ...]:
             "The same fit to part of the cases, scored on the same held-out ones.",
             (Figures((figure,)), table(("cases", "R², drift flux", "R², H", "rms of H"), body)),
         ),
-    )
-
-
-def _limits(cases: Sequence[LimitCase]) -> Section:
-    body: list[list[Cell | str]] = [
-        [
-            case.name, number(case.error, 2), number(case.bound, 2),
-            Cell("✓ holds", "good") if case.passed else Cell("✗ fails", "bad"),
-        ]
-        for case in cases
-    ]  # fmt: skip
-    return Section(
-        "limits",
-        "Limits that hold by construction",
-        "Largest deviation, or share of places that violate it. Nothing is clipped.",
-        (table(("Law", "deviation", "bound", "verdict"), body, words=(0, 3)),),
     )
 
 

@@ -30,6 +30,7 @@ from greybed.report.elements import (
     percent,
     table,
 )
+from greybed.report.laws import laws_section
 
 MOST_POINTS = 20_000
 # Nominal shares of intervals at which the calibration is looked at, and their half-widths.
@@ -71,7 +72,7 @@ def render_model(
         _accuracy(name, c, p.view_factor, p.stderr, card),
         _uncertainty(c, p.view_factor, p.stderr, score),
         *_learning(card.get("learning_curve") or ()),
-        _limits(cases),
+        laws_section(cases, "Largest deviation over random markers."),
         _card(card),
     )
     page = Page(
@@ -216,22 +217,6 @@ def curve_figure(packings: Sequence[int], rmse: Sequence[float]) -> Markup:
         axes.set_xlabel("training packings")
         axes.set_ylabel("own error of F, rms")
         return figures.to_svg(figure, "error against number of training packings")
-
-
-def _limits(cases: Sequence[LimitCase]) -> Section:
-    rows: list[list[Cell | str]] = [
-        [
-            case.name, number(case.error, 2), number(case.bound, 2),
-            Cell("✓ holds", "good") if case.passed else Cell("✗ fails", "bad"),
-        ]
-        for case in cases
-    ]  # fmt: skip
-    return Section(
-        "limits",
-        "Limits that hold by construction",
-        "Largest deviation over random markers.",
-        (table(("Law", "deviation", "bound", "verdict"), rows, words=(0, 3)),),
-    )
 
 
 def _card(card: Mapping[str, Any]) -> Section:

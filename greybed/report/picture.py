@@ -99,6 +99,80 @@ class _Camera:
         return origins, directions
 
 
+@dataclass(frozen=True)
+class Sight:
+    """What the eye sees of a bed: traced once, painted as often as there are values to show."""
+
+    shape: tuple[int, int]  # rows and columns of the picture [pixels]
+    shown: NDArray[np.bool_]  # which spheres of the packing are left after the cut, shape (n,)
+    met: NDArray[np.bool_]  # rays that meet one of them, by subpixel
+    owner: NDArray[np.int64]  # whom those meet, an index among the shown
+    shade: Array  # how bright each meets it [-]
+
+    def paint(
+        self,
+        values: ArrayLike,
+        *,
+        limits: tuple[float, float] | None = None,
+        colours: ListedColormap = HEAT,
+    ) -> NDArray[np.uint8]:
+        """Picture, shape (height, width, 4), coloured by one value per sphere of the packing.
+
+        Raises
+        ------
+        InputError
+            If there is not one value per sphere.
+        """
+        v = np.asarray(values, dtype=np.float64)
+        if v.shape != self.shown.shape:
+            raise InputError(
+                f"values have shape {v.shape}; give one per sphere, {self.shown.shape}."
+            )
+        rgba = np.zeros((len(self.met), 4))
+        colour = colour_of(v[self.shown], limits, colours)[self.owner]
+        rgba[self.met, :3] = colour * self.shade[:, None]
+        rgba[self.met, 3] = 1.0
+        n, (height, width) = SUPERSAMPLING, self.shape
+        rgba = rgba.reshape(height, n, width, n, 4).mean(axis=(1, 3))
+        rgba[..., :3] /= np.maximum(rgba[..., 3:], 1e-9)
+        return np.round(255.0 * np.clip(rgba, 0.0, 1.0)).astype(np.uint8)
+
+
+def look_at(
+    packing: Packing,
+    *,
+    width: int = 600,
+    height: int | None = None,
+    view: View | None = None,
+    cut: bool = True,
+    stage: ArrayLike | None = None,
+) -> Sight:
+    """Trace what the eye sees of a bed; the options are those of :func:`bed_picture`."""
+    if width < 1 or (height is not None and height < 1):
+        raise InputError(f"a picture of {width} x {height} pixels is empty; give at least 1 x 1.")
+    view = view or View()
+    shown = in_view(packing, view) if cut else np.ones(len(packing), dtype=bool)
+    bed = Packing(packing.centres[shown], packing.radii[shown], source=packing.source)
+    camera = _Camera.around(view, bed.centres, bed.radii)
+    if stage is not None:
+        box = np.asarray(stage, dtype=np.float64)
+        corners = np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
+        camera = _Camera.around(view, corners, np.zeros(len(corners)))
+    if height is None:
+        size = camera.high - camera.low
+        height = max(1, round(width * float(size[1] / size[0])))
+    n = SUPERSAMPLING
+    origins, directions = camera.rays(n * width, n * height)
+    distance, owner = first_hits(bed, origins, directions)
+    met = owner >= 0
+    along = directions[met] / np.linalg.norm(directions[met], axis=1, keepdims=True)
+    points = origins[met] + distance[met, None] * along
+    owner = owner[met]
+    normals = (points - bed.centres[owner]) / bed.radii[owner, None]
+    shade = _light(normals, camera.frame) * _openness(bed, points, normals)
+    return Sight((height, width), shown, met, owner, shade)
+
+
 def bed_picture(
     packing: Packing,
     values: ArrayLike,
@@ -142,40 +216,8 @@ def bed_picture(
     InputError
         If there is not one value per sphere, or the size is below one pixel.
     """
-    v = np.asarray(values, dtype=np.float64)
-    if v.shape != (len(packing),):
-        raise InputError(
-            f"{packing.source}: values have shape {v.shape}; give one per sphere, "
-            f"({len(packing)},)."
-        )
-    if width < 1 or (height is not None and height < 1):
-        raise InputError(f"a picture of {width} x {height} pixels is empty; give at least 1 x 1.")
-    view = view or View()
-    shown = in_view(packing, view) if cut else np.ones(len(packing), dtype=bool)
-    bed = Packing(packing.centres[shown], packing.radii[shown], source=packing.source)
-    camera = _Camera.around(view, bed.centres, bed.radii)
-    if stage is not None:
-        box = np.asarray(stage, dtype=np.float64)
-        corners = np.stack(np.meshgrid(*box.T, indexing="ij"), axis=-1).reshape(-1, 3)
-        camera = _Camera.around(view, corners, np.zeros(len(corners)))
-    if height is None:
-        size = camera.high - camera.low
-        height = max(1, round(width * float(size[1] / size[0])))
-    n = SUPERSAMPLING
-    origins, directions = camera.rays(n * width, n * height)
-    distance, owner = first_hits(bed, origins, directions)
-    met = owner >= 0
-    along = directions[met] / np.linalg.norm(directions[met], axis=1, keepdims=True)
-    points = origins[met] + distance[met, None] * along
-    owner = owner[met]
-    normals = (points - bed.centres[owner]) / bed.radii[owner, None]
-    rgba = np.zeros((len(met), 4))
-    shade = _light(normals, camera.frame) * _openness(bed, points, normals)
-    rgba[met, :3] = colour_of(v[shown], limits, colours)[owner] * shade[:, None]
-    rgba[met, 3] = 1.0
-    rgba = rgba.reshape(height, n, width, n, 4).mean(axis=(1, 3))
-    rgba[..., :3] /= np.maximum(rgba[..., 3:], 1e-9)
-    return np.round(255.0 * np.clip(rgba, 0.0, 1.0)).astype(np.uint8)
+    sight = look_at(packing, width=width, height=height, view=view, cut=cut, stage=stage)
+    return sight.paint(values, limits=limits, colours=colours)
 
 
 def in_view(packing: Packing, view: View) -> NDArray[np.bool_]:

@@ -94,6 +94,7 @@ def quickstart(
     results = {
         "version": __version__,
         "seed": seed,
+        "small": small,
         "machine": {
             "processors": os.cpu_count(),
             "python": platform.python_version(),

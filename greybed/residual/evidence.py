@@ -1,4 +1,10 @@
-"""Evidence of sets of terms: Gaussian algebra on a noise grid, vectorised over sets and samples."""
+"""Evidence of sets of terms: Gaussian algebra on a noise grid, vectorised over sets and samples.
+
+Words here: an *atom* is one column that a term may add, with a Gaussian prior of its amplitude; a
+term of an unknown exponent has several. A *point* of the noise grid is one group error (tau, T of
+them) with one random error (sigma, S of them); points are counted as ``h = tau_index * S +
+sigma_index``. *Nuisance* columns are always there, such as those of free parameters.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +18,8 @@ from greybed.residual.terms import Term
 
 Array = NDArray[np.float64]
 
-COARSE = (3, 4)  # every so many group and random errors in a search over sets
-NEAR = 2.2  # factor of random errors about that of the data which a bootstrap can meet
+COARSE = (3, 4)  # a search over sets looks at every third group error, every fourth random one
+NEAR = 2.2  # bootstrap samples lie within this factor of the data's random error
 
 
 def log_sum(values: Array, axis: int | tuple[int, ...]) -> Array:
@@ -33,12 +39,12 @@ class Scan:
         T group errors by S random errors; H = T S points.
     log_null : ndarray (H,)
         Log density of the residual without any term, times the prior of the point.
-    c, norm : ndarray (H, m)
-        Atoms against the residual, and against themselves.
+    dot, norm : ndarray (H, m)
+        Weighted products of each atom with the residual, and with itself.
     coarse : ndarray (C,), int
         Points of the grid that stand for all in a search over sets.
-    q : ndarray (C, m, m)
-        Atoms against atoms there.
+    gram : ndarray (C, m, m)
+        Weighted products of all atoms with each other there.
     mean, precision, log_weight : ndarray (m,)
         Priors of the atoms, with the prior of their term.
     term : ndarray (m,), int
@@ -47,10 +53,10 @@ class Scan:
 
     grid: NoiseGrid
     log_null: Array
-    c: Array
+    dot: Array
     norm: Array
     coarse: NDArray[np.int64]
-    q: Array
+    gram: Array
     mean: Array
     precision: Array
     log_weight: Array
@@ -58,17 +64,17 @@ class Scan:
 
     def singles(self) -> Array:
         """Log evidence of each atom with its prior, against 1 for the null, shape (m,)."""
-        factor = self.factors(self.c, self.norm)
+        factor = self.factors(self.dot, self.norm)
         joint = log_sum(self.log_null[:, None] + factor, axis=0)
         return joint + self.log_weight - log_sum(self.log_null, axis=0)
 
-    def factors(self, c: Array, norm: Array) -> Array:
-        """Log Bayes factor of single atoms for projections and norms (broadcasting)."""
+    def factors(self, dot: Array, norm: Array) -> Array:
+        """Log Bayes factor of single atoms for given products, (..., m)."""
         mean, precision = self.mean, self.precision
-        b = c - norm * mean
+        b = dot - norm * mean
         return (
             0.5 * b**2 / (norm + precision)
-            + mean * c
+            + mean * dot
             - 0.5 * mean**2 * norm
             - 0.5 * np.log1p(norm / precision)
         )
@@ -102,15 +108,19 @@ def scan(
     side = grid.rotate(nuisance)  # (T, n, p)
     weight = grid.precision()  # (T, S, n)
     t, s, n = weight.shape
-    first = weight @ (rotated * rotated[:, :, :1])  # (T, S, 1 + m): against the residual
+    # Column 0 is the residual itself, in dot, norm and gram alike; it is taken off at the end.
+    dot = weight @ (rotated * rotated[:, :, :1])  # (T, S, 1 + m)
     norm = weight @ rotated**2
     log_null = (grid.log_prior - 0.5 * grid.log_det()).ravel()
-    first, norm = first.reshape(t * s, -1), norm.reshape(t * s, -1)
+    dot, norm = dot.reshape(t * s, -1), norm.reshape(t * s, -1)
     coarse = _coarse(t, s)
-    heavy = weight.reshape(t * s, n)[coarse]
-    of_tau = coarse // s
-    q = np.stack(
-        [rotated[k].T @ (rotated[k] * w[:, None]) for k, w in zip(of_tau, heavy, strict=True)]
+    coarse_weight = weight.reshape(t * s, n)[coarse]
+    coarse_tau = coarse // s
+    gram = np.stack(
+        [
+            rotated[k].T @ (rotated[k] * w[:, None])
+            for k, w in zip(coarse_tau, coarse_weight, strict=True)
+        ]
     )
     if p:
         products = side[:, :, :, None] * side[:, :, None, :]
@@ -118,17 +128,17 @@ def scan(
         cross = np.stack([weight @ (rotated * side[:, :, j : j + 1]) for j in range(p)], axis=2)
         cross = cross.reshape(t * s, p, -1)
         solved = np.linalg.solve(inner, cross)
-        first = first - np.einsum("hp,hpm->hm", cross[:, :, 0], solved)
+        dot = dot - np.einsum("hp,hpm->hm", cross[:, :, 0], solved)
         norm = norm - np.einsum("hpm,hpm->hm", cross, solved)
-        q = q - np.swapaxes(cross[coarse], 1, 2) @ solved[coarse]
+        gram = gram - np.swapaxes(cross[coarse], 1, 2) @ solved[coarse]
         log_null = log_null - 0.5 * np.linalg.slogdet(inner)[1] + 0.5 * np.log(precision).sum()
     return Scan(
         grid,
         log_null - 0.5 * norm[:, 0],
-        first[:, 1:],
+        dot[:, 1:],
         norm[:, 1:],
         coarse,
-        q[:, 1:, 1:],
+        gram[:, 1:, 1:],
         np.array([a.mean for a, _ in atoms]),
         np.array([a.sd for a, _ in atoms]) ** -2.0,
         np.array([a.log_weight + terms[i].log_prior for a, i in atoms]),
@@ -177,8 +187,8 @@ def null_statistics(
         the data allow for it.
     """
     n = len(nuisance)
-    chance = np.exp(whole.log_null - whole.log_null.max())
-    points = generator.choice(len(chance), size=samples, p=chance / chance.sum())
+    share = np.exp(whole.log_null - whole.log_null.max())
+    points = generator.choice(len(share), size=samples, p=share / share.sum())
     tau, sigma = np.divmod(points, len(grid.sigma))
     white = generator.standard_normal((samples, n))
     rotated = white * np.sqrt(grid.sigma[sigma][:, None] ** 2 + grid.values[tau])
@@ -212,18 +222,18 @@ def _statistics(
             square = np.einsum("nb,nb->b", rotated_draws[k], weighted)
             cross = rotated[k].T @ weighted  # (p + m, B)
             norm = weight[k, s] @ rotated[k][:, p:] ** 2
-            base, c = constant[k, s], cross[p:]
+            base, dot = constant[k, s], cross[p:]
             if p:
                 scaled = rotated[k][:, :p] * weight[k, s][:, None]
                 inner = rotated[k][:, :p].T @ scaled + np.diag(precision)
                 mixed = rotated[k][:, p:].T @ scaled
                 solved = np.linalg.solve(inner, cross[:p])
                 square = square - np.einsum("pb,pb->b", cross[:p], solved)
-                c = c - mixed @ solved
+                dot = dot - mixed @ solved
                 norm = norm - np.einsum("mp,mp->m", mixed, np.linalg.solve(inner, mixed.T).T)
                 base = base - 0.5 * np.linalg.slogdet(inner)[1]
             null = base - 0.5 * square
-            factor = whole.factors(c.T, norm) + whole.log_weight
+            factor = whole.factors(dot.T, norm) + whole.log_weight
             none = np.logaddexp(none, null)
             some = np.logaddexp(some, null + log_sum(factor, axis=1))
     return some - none

@@ -135,6 +135,11 @@ class _Prior:
     log_pulling: float  # the part of the density that pulls: what a fit weighs against the data
 
 
+def _log_normal(x: Array | float, sd: Array | float) -> Array:
+    """Log density of a normal variable about 0; scipy's checks take ten times as long here."""
+    return -0.5 * (np.divide(x, sd) ** 2 + LOG_2PI) - np.log(sd)
+
+
 def _prior(problem: Problem, terms: tuple[Term, ...], u: Array, flat: int | None = None) -> _Prior:
     p = len(problem.names)
     precision = np.zeros(len(u))
@@ -142,14 +147,14 @@ def _prior(problem: Problem, terms: tuple[Term, ...], u: Array, flat: int | None
     density = even = 0.0
     precision[:p] = problem.prior_sd**-2.0
     pull[:p] = -u[:p] * precision[:p]
-    density += float(np.sum(stats.norm.logpdf(u[:p], scale=problem.prior_sd))) if p else 0.0
+    density += float(np.sum(_log_normal(u[:p], problem.prior_sd)))
     for term, k in zip(terms, offsets(terms, p), strict=True):
         if term.kind == "effect":
             assert term.effect is not None
             if term.effect.theory is not None:
                 sds = np.array([term.spread, OFF_SPREAD])
                 logs = np.log([1.0 - OFF_THEORY, OFF_THEORY])
-                logs = logs + stats.norm.logpdf(u[k], 1.0, sds)
+                logs = logs + _log_normal(u[k] - 1.0, sds)
                 total = float(np.logaddexp(*logs))
                 share = np.exp(logs - total)
                 precision[k] = float(share @ sds**-2.0)
@@ -167,7 +172,7 @@ def _prior(problem: Problem, terms: tuple[Term, ...], u: Array, flat: int | None
             sd = LABEL_SD if term.kind == "label" else POWER_SD
             precision[k] = sd**-2.0
             pull[k] = -u[k] * precision[k]
-            density += float(stats.norm.logpdf(u[k], scale=sd))
+            density += float(_log_normal(u[k], sd))
             if term.size == 2:
                 precision[k + 1] = 2.0 * np.pi / (2.0 * LARGEST_EXPONENT) ** 2
                 even -= float(np.log(2.0 * LARGEST_EXPONENT))

@@ -39,8 +39,8 @@ def _set_scores(scan: Scan, sets: NDArray[np.int64]) -> Array:
     diagonal = scan.precision[sets]
     log_prior = 0.5 * np.log(diagonal).sum(axis=1)
     for i, h in enumerate(scan.coarse):
-        q = scan.q[i][sets[:, :, None], sets[:, None, :]]
-        c = scan.c[h][sets]
+        q = scan.gram[i][sets[:, :, None], sets[:, None, :]]
+        c = scan.dot[h][sets]
         qm = np.einsum("nij,nj->ni", q, mean)
         b = c - qm
         inner = q + np.eye(k) * diagonal[:, :, None]
@@ -173,7 +173,7 @@ def _first_amplitude(scan: Scan, atom: int, term: Term, free: bool) -> float:
         return float(scan.mean[atom])
     h = int(np.argmax(scan.log_null))
     weight = 1e-12 if free else scan.precision[atom]
-    value = float(scan.c[h, atom] / (scan.norm[h, atom] + weight))
+    value = float(scan.dot[h, atom] / (scan.norm[h, atom] + weight))
     return value if value != 0.0 else 1e-3
 
 

@@ -120,14 +120,14 @@ def test_wilson_interval():
 
 
 def test_the_analysis_passes_a_small_blind_test(tmp_path):
-    rows = blind_test(tmp_path, 22, 11, ("none", "one", "outside", "faulty"), competitors=True)
+    rows = blind_test(tmp_path, 12, 11, ("none", "one", "outside", "faulty"), competitors=True)
     wrong = [row["set"] for row in rows if confident_and_wrong(row)]
     alarms = [
         row["set"]
         for row in rows
         if row["truth"]["kind"] == "none" and row["found"]["verdict"] != "none"
     ]
-    # of 22 sets, chance allows one of either at the rates that the whole test has
+    # of 12 sets, chance allows one of either at the rates that the whole test has
     assert len(wrong) <= 1
     assert len(alarms) <= 1
     strong = [

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from greybed.core import OutputError
-from greybed.core.files import sole_writer
+from greybed.core.folder_lock import sole_writer
 from greybed.report.stages import Stages
 
 DESIGN = "rays = 6000\nemitters = 40\nseed = 4\n" + "".join(
@@ -179,6 +179,32 @@ def test_a_stage_whose_record_was_cut_is_done_again(tmp_path):
     assert len(calls) == 4
 
 
+def test_what_follows_a_changed_file_is_done_again(tmp_path):
+    calls = []
+
+    def run():
+        stages = Stages(tmp_path, {}, lambda line: None)
+        for name in "abc":
+
+            def work(name=name):
+                calls.append(name)
+                (tmp_path / name).write_text(name)
+                return {}, {}, [tmp_path / name]
+
+            stages.run(name, name, work)
+
+    run()
+    run()
+    assert calls == [*"abc"]
+    (tmp_path / "b").write_text("changed")
+    run()
+    assert calls[3:] == ["b"]  # its file is as it was: what follows stands
+    (tmp_path / "b").unlink()
+    (tmp_path / ".state/c.json").unlink()
+    run()
+    assert calls[4:] == ["b", "c"]
+
+
 INTERRUPTS = {
     "info": ("info", "bed.csv"),
     "convert": ("convert", "bed.csv", "out.h5"),
@@ -314,7 +340,7 @@ def test_many_runs_take_a_lock_in_turn(tmp_path):
     code = (
         "import sys, time, pathlib\n"
         "from greybed.core import OutputError\n"
-        "from greybed.core.files import sole_writer\n"
+        "from greybed.core.folder_lock import sole_writer\n"
         "number = pathlib.Path('number')\n"
         "for _ in range(40):\n"
         "    while True:\n"

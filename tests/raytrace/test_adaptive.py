@@ -22,9 +22,9 @@ def everything(result):
 @pytest.mark.parametrize("kind", ["periodic", "walls", "overlapping"])
 def test_reached_and_true(kind):
     if kind == "walls":
-        packing = random_packing(60, 0.45, Uniform(1.0, 2.0), seed=8, container=Box())
+        packing = random_packing(40, 0.45, Uniform(1.0, 2.0), seed=8, container=Box())
     else:
-        packing = random_packing(60, 0.45, Uniform(1.0, 2.0), seed=8)
+        packing = random_packing(40, 0.45, Uniform(1.0, 2.0), seed=8)
     if kind == "overlapping":
         packing = Packing(packing.centres, 1.05 * packing.radii, packing.box, packing.periodic)
     result = view_factors(packing, rays=2048, rel_error=0.02, least=0.01, seed=1)
@@ -34,10 +34,10 @@ def test_reached_and_true(kind):
     assert result.reciprocal
     exchange = result.factors.toarray() * result.areas[:, None]
     assert np.abs(exchange - exchange.T).max() <= 1e-14 * exchange.max()
-    reference = view_factors(packing, rays=300_000, seed=77)
+    reference = view_factors(packing, rays=200_000, seed=77)
     truth, noise = everything(reference)
     z = (value - truth)[large] / np.hypot(error, noise)[large]
-    assert large.sum() > 500
+    assert large.sum() > 350
     assert np.abs(z).max() < 5.0
     assert 0.92 < (np.abs(z) < 1.96).mean() < 0.995
     assert (result.cost >= 2048).all()

@@ -32,8 +32,9 @@ def test_nothing_missing_is_said_with_what_would_have_been_seen():
 def test_what_is_called_detectable_is_detected():
     found = diagnose(spheres(2))
     amplitude = found.detectable["effects"]["shape"]["amplitude"]
-    seen = [diagnose(spheres(s, effects={"shape": amplitude})).verdict for s in range(40, 50)]
-    assert sum(verdict != "none" for verdict in seen) >= 7  # nine in ten is promised
+    seen = [diagnose(spheres(s, effects={"shape": amplitude})).verdict for s in range(40, 46)]
+    # Nine in ten are promised: fewer than four of six come by chance once in sixty times.
+    assert sum(verdict != "none" for verdict in seen) >= 4
 
 
 @pytest.mark.parametrize("name", ["wall", "inertia", "shape", "viscosity-temperature"])
@@ -181,19 +182,11 @@ def test_standard_drag_coefficients_get_no_invented_effect(body):
     assert found.effects == ()
 
 
-@pytest.mark.parametrize(
-    ("rig", "named"),
-    [
-        ("rough", {"wall-friction"}),
-        ("smooth", set()),
-        ("viscous", {"velocity-dependent-restitution"}),
-        ("constant", set()),
-    ],
-)
-def test_the_laboratory_of_another_simulator(rig, named):
-    found = diagnose(read_study(EXAMPLES / f"laboratory/study_{rig}.toml"))
-    assert found.verdict == ("effect" if named else "none")
-    assert names(found) == named
+def test_nothing_is_missing_from_a_silo_with_smooth_walls():
+    # the other laboratories: tests/examples/test_laboratories.py
+    found = diagnose(read_study(EXAMPLES / "laboratories/silo/study_smooth.toml"))
+    assert found.verdict == "none"
+    assert found.effects == ()
 
 
 def test_a_model_for_another_response_is_refused():

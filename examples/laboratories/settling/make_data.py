@@ -80,7 +80,8 @@ snGradSchemes { default none; }
 scale 1;
 vertices ((0 0 -9) (1 0 -9) (1 1 -9) (0 1 -9) (0 0 1) (1 0 1) (1 1 1) (0 1 1));
 blocks (hex (0 1 2 3 4 5 6 7) (1 1 4) simpleGrading (1 1 1));
-boundary (sides { type patch; faces ((0 3 2 1) (4 5 6 7) (0 1 5 4) (1 2 6 5) (2 3 7 6) (3 0 4 7)); });
+boundary (sides { type patch;
+ faces ((0 3 2 1) (4 5 6 7) (0 1 5 4) (1 2 6 5) (2 3 7 6) (3 0 4 7)); });
 """,
         )
         write(

@@ -23,6 +23,7 @@ import tomli_w
 from greybed.calibration.experiment import COST, Experiment, Measure, RunFailed, Value
 from greybed.core.errors import InputError
 from greybed.core.files import sha256_of
+from greybed.core.processes import ending_with_parent
 
 INPUT, OUTPUT = "input.toml", "output.json"
 _TAIL = 200  # characters of what a failed command said
@@ -119,7 +120,7 @@ def _run(words: Sequence[str], folder: str, limit: float) -> tuple[int, str]:
     """Exit code and the end of what was said; what it started ends with it."""
     with subprocess.Popen(
         words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-        errors="replace", start_new_session=True,
+        errors="replace", start_new_session=True, preexec_fn=ending_with_parent(),
     ) as process:  # fmt: skip
         try:
             said, _ = process.communicate(timeout=limit)

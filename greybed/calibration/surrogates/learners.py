@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from greybed.calibration.surrogates.base import Sample, Surrogate
 
@@ -89,7 +90,8 @@ class Network(_Ensemble):
                 hidden_layer_sizes=(12,), activation="tanh", solver="lbfgs", alpha=0.03,
                 max_iter=400, random_state=seed + k,
             )  # fmt: skip
-            with warnings.catch_warnings():
+            # Matrices this small take eight times as long where threads wait for each other.
+            with threadpool_limits(1), warnings.catch_warnings():
                 warnings.simplefilter("ignore", ConvergenceWarning)
                 member.fit(2.0 * sample.x - 1.0, y)
             members.append(member)

@@ -12,6 +12,7 @@ from greybed.core.packing import Packing
 from greybed.core.readers.hdf5 import FORMAT, VERSION
 from greybed.core.records import record
 from greybed.core.walls import Mesh
+from greybed.core.writers.hdf5_stream import written_hdf5
 
 
 def write(packing: Packing, path: Path, fields: dict[str, NDArray[np.float64]]) -> None:
@@ -26,11 +27,10 @@ def write(packing: Packing, path: Path, fields: dict[str, NDArray[np.float64]]) 
     fields : dict
         Empty; this version of the format holds none.
     """
-    import h5py
 
     # File structures since HDF5 1.10 carry check sums, and texts of fixed length need no heap:
     # in a damaged heap the HDF5 library can search for ever.
-    with h5py.File(path, "w", libver=("v110", "v110")) as root:
+    with written_hdf5(path, libver=("v110", "v110")) as root:
         root.attrs["format"] = np.bytes_(FORMAT)
         root.attrs["version"] = VERSION
         root.attrs["periodic"] = np.array(packing.periodic, dtype=np.uint8)

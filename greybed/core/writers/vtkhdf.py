@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from greybed.core.errors import InputError
 from greybed.core.files import atomic_path
 from greybed.core.packing import Packing
+from greybed.core.writers.vtkhdf_root import steps_of, vtkhdf_file
 
 # Rows in a chunk of the arrays, which grow by a frame at a time.
 _CHUNK = 4096
@@ -81,15 +82,7 @@ def join_parts(path: str | os.PathLike[str], parts: Sequence[str | os.PathLike[s
     OutputError
         If the file cannot be written.
     """
-    if not parts:
-        raise InputError(f"{path}: there is no frame to write; give one at least.")
-    import h5py
-
-    with atomic_path(path) as target, h5py.File(target, "w", libver=("v110", "v110")) as file:
-        root = file.create_group("VTKHDF")
-        root.attrs["Version"] = np.array([2, 0], dtype=np.int64)
-        # A text of fixed length in ASCII: readers of VTK take no other.
-        root.attrs.create("Type", np.bytes_("UnstructuredGrid"))
+    with vtkhdf_file(path, "UnstructuredGrid", len(parts)) as root:
         counts, times = [], []
         names: list[str] | None = None
         for part in parts:
@@ -111,9 +104,7 @@ def join_parts(path: str | os.PathLike[str], parts: Sequence[str | os.PathLike[s
         for name in ("NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"):
             root[name] = np.array(counts, dtype=np.int64)
         before = np.cumsum([0, *counts[:-1]])
-        steps = root.create_group("Steps")
-        steps.attrs["NSteps"] = len(counts)
-        steps["Values"] = np.array(times)
+        steps = steps_of(root, times)
         steps["NumberOfParts"] = np.ones(len(counts), np.int64)
         steps["PartOffsets"] = np.arange(len(counts))
         for name in ("PointOffsets", "CellOffsets", "ConnectivityIdOffsets"):

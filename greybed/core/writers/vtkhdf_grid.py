@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from greybed.core.errors import InputError
 from greybed.core.files import atomic_path
+from greybed.core.writers.vtkhdf_root import steps_of, vtkhdf_file
 
 
 def write_grid_part(
@@ -70,15 +70,7 @@ def join_grid_parts(
     OutputError
         If the file cannot be written.
     """
-    if not parts:
-        raise InputError(f"{path}: there is no frame to write; give one at least.")
-    import h5py
-
-    with atomic_path(path) as target, h5py.File(target, "w", libver=("v110", "v110")) as file:
-        root = file.create_group("VTKHDF")
-        root.attrs["Version"] = np.array([2, 0], dtype=np.int64)
-        # A text of fixed length in ASCII: readers of VTK take no other.
-        root.attrs.create("Type", np.bytes_("ImageData"))
+    with vtkhdf_file(path, "ImageData", len(parts)) as root:
         nx, ny, nz = cells
         root.attrs["WholeExtent"] = np.array([0, nx, 0, ny, 0, nz], dtype=np.int64)
         root.attrs["Origin"] = np.array(lower)
@@ -97,7 +89,5 @@ def join_grid_parts(
                         )  # fmt: skip
                     data[name][number] = values
                 times.append(float(frame["time"]))
-        steps = root.create_group("Steps")
-        steps.attrs["NSteps"] = len(times)
-        steps["Values"] = np.array(times)
+        steps_of(root, times)
     return Path(path)

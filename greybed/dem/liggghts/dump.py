@@ -35,12 +35,17 @@ def read_dump(path: Path) -> tuple[int, Array]:
     if len(data) < _HEAD.size:
         raise InputError(f"{path}: this dump of LIGGGHTS is cut short; free space and run again.")
     step, count, *_, width, blocks = _HEAD.unpack_from(data)
-    at, parts = _HEAD.size, []
+    at, parts = _HEAD.size, [np.empty(0)]
     for _ in range(blocks):
-        (n,) = struct.unpack_from("=i", data, at)
+        n = struct.unpack_from("=i", data, at)[0] if at + 4 <= len(data) else -1
+        if n < 0 or at + 4 + 8 * n > len(data):
+            raise InputError(
+                f"{path}: this dump of LIGGGHTS is cut short; free space and run again."
+            )
         parts.append(np.frombuffer(data, np.float64, n, at + 4))
         at += 4 + 8 * n
-    rows = np.concatenate(parts).reshape(-1, width)
+    rows = np.concatenate(parts)
+    rows = rows.reshape(-1, _WIDTH) if rows.size % _WIDTH == 0 else rows[:, None]
     if width != _WIDTH or len(rows) != count:
         raise InputError(
             f"{path}: this dump of LIGGGHTS has {len(rows)} rows of {width} columns, not "

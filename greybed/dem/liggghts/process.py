@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import shutil
 import signal
 import subprocess
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from greybed.core.errors import InputError
-
-_PARENT_DIES = 1  # PR_SET_PDEATHSIG
+from greybed.core.processes import ending_with_parent
 
 
 def command(ranks: int, deck: str, log: str, program: str = "liggghts") -> list[str]:
@@ -55,15 +52,10 @@ def started(
     environment = {**os.environ, "OMP_NUM_THREADS": "1", **(more or {})}
     if os.geteuid() == 0:  # in containers; Open MPI asks for both
         environment |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
-    library = ctypes.CDLL(None) if sys.platform == "linux" else None
-
-    def end_with_parent() -> None:
-        if library is not None:
-            library.prctl(_PARENT_DIES, signal.SIGTERM)
-
     child = subprocess.Popen(
         words, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-        errors="replace", env=environment, start_new_session=True, preexec_fn=end_with_parent,
+        errors="replace", env=environment, start_new_session=True,
+        preexec_fn=ending_with_parent(signal.SIGTERM),
     )  # fmt: skip
     try:
         yield child

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from greybed.core.errors import InputError
 
 Array = NDArray[np.float64]
+MOST_POWER = 100  # of a file that may hold any; it is a number of multiplications
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,8 @@ class Gate:
     def from_arrays(cls, arrays: dict[str, NDArray]) -> Gate:
         """Rebuild from :meth:`arrays`."""
         a, dilute, packing, power = arrays["gate"].tolist()
+        if not 1 <= power <= MOST_POWER:
+            raise ValueError(f"gate: its power is {power:g}")
         return cls(a, dilute, packing, int(power))
 
 
