@@ -1,9 +1,9 @@
 """The full circle of one laboratory: what a model predicts for an experiment that no study read.
 
-Three models predict ``HELD_OUT.csv``: the study's as it is; the same with its parameters fitted
-to the study's table wherever that takes them, whatever was measured of them; the one that the
-diagnosis wrote. Errors are root mean squares of the log of predicted over measured; their 95 % intervals come
-from 4000 resamplings of the rows. Run:
+Three models predict ``HELD_OUT.csv``: the study's as it is; the same with its parameters fitted to
+the study's table wherever that takes them, whatever was measured of them; the one that the
+diagnosis wrote. Errors are root mean squares of the log of predicted over measured; their 95 %
+intervals come from 4000 resamplings of the rows. Run:
 
     python circle.py settling/study_spheres.toml settling/spheres_held_out.csv --out runs/spheres
 """

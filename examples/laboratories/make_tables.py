@@ -44,7 +44,7 @@ LAUNCHER = 0.01
 FRICTION, ROLLING = 0.42, 0.1
 
 # held out: a narrower silo, filled higher; slower and faster impacts; slower and faster launches
-NEW_FILLS = ((0.0125, 700, 0.36),)
+NEW_FILLS = ((0.0125, 700, 0.36), (0.0125, 250, 0.14))
 NEW_SPEEDS = (0.01, 4.0)
 NEW_LAUNCHES = (1.2, 5.0)
 
