@@ -63,4 +63,5 @@ def test_grains_and_spheres_differ_where_inertia_counts():
         rows = (FOLDER / f"settling/{name}.csv").read_text().splitlines()[1:]
         ratio.append(np.array([float(row.split(",")[3]) for row in rows]).reshape(-1, 4).mean(1))
     assert np.all(ratio[0] < ratio[1])
-    assert ratio[0][-1] / ratio[1][-1] < 0.8 * ratio[0][0] / ratio[1][0]
+    # means of four rows of 1.8 % each: their double ratio is good to 1.8 %; five times that
+    assert ratio[0][-1] / ratio[1][-1] < (1.0 - 5 * 0.018) * ratio[0][0] / ratio[1][0]
