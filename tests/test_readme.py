@@ -19,7 +19,8 @@ import pytest
 from greybed.cli.main import VERBS
 
 ROOT = Path(__file__).parents[1]
-PAGES = ["README.md", "CONTRIBUTING.md", *sorted(f"docs/{p.name}" for p in ROOT.glob("docs/*.md"))]
+FOUND = (*ROOT.glob("docs/*.md"), *ROOT.glob("docs/tutorials/*.md"))
+PAGES = ["README.md", "CONTRIBUTING.md", *sorted(str(p.relative_to(ROOT)) for p in FOUND)]
 BLOCK = re.compile(
     r"(?:<!-- not run: (?P<reason>[^\n]+?) -->\n)?```(?P<kind>sh|bash|python)\n(?P<code>.*?)^```",
     re.DOTALL | re.MULTILINE,

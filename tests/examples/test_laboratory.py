@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-LABORATORY = Path(__file__).parents[2] / "examples/laboratory"
+LABORATORY = Path(__file__).parents[2] / "examples/laboratories"
 needs_liggghts = pytest.mark.skipif(
     shutil.which("liggghts") is None, reason="liggghts is not installed"
 )
@@ -26,7 +26,7 @@ def tables():
 
 
 def table(name):
-    rows = list(csv.reader((LABORATORY / f"{name}.csv").read_text().splitlines()))
+    rows = list(csv.reader(next(LABORATORY.glob(f"*/{name}.csv")).read_text().splitlines()))
     return {head.split(" ")[0]: [row[k] for row in rows[1:]] for k, head in enumerate(rows[0])}
 
 

@@ -182,19 +182,11 @@ def test_standard_drag_coefficients_get_no_invented_effect(body):
     assert found.effects == ()
 
 
-@pytest.mark.parametrize(
-    ("rig", "named"),
-    [
-        ("rough", {"wall-friction"}),
-        ("smooth", set()),
-        ("viscous", {"velocity-dependent-restitution"}),
-        ("constant", set()),
-    ],
-)
-def test_the_laboratory_of_another_simulator(rig, named):
-    found = diagnose(read_study(EXAMPLES / f"laboratory/study_{rig}.toml"))
-    assert found.verdict == ("effect" if named else "none")
-    assert names(found) == named
+def test_nothing_is_missing_from_a_silo_with_smooth_walls():
+    # the other laboratories: tests/examples/test_laboratories.py
+    found = diagnose(read_study(EXAMPLES / "laboratories/silo/study_smooth.toml"))
+    assert found.verdict == "none"
+    assert found.effects == ()
 
 
 def test_a_model_for_another_response_is_refused():
