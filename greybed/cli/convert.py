@@ -8,6 +8,7 @@ Examples:
 from __future__ import annotations
 
 import argparse
+from contextlib import suppress
 from pathlib import Path
 
 from greybed.cli.info import add_input_arguments, read_input
@@ -26,7 +27,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Read, write, and say what the new file does not hold."""
     from greybed.core.errors import InputError
-    from greybed.core.files import output_folder
     from greybed.core.writers import keeps_surroundings, write_packing
 
     out = Path(options.out)
@@ -34,7 +34,8 @@ def run(options: argparse.Namespace) -> int:
     if out.exists() and Path(options.file).exists() and out.samefile(options.file):
         raise InputError(f"{out}: this is the input file itself; choose another name.")
     packing = read_input(options)
-    output_folder(out.parent)
+    with suppress(OSError):  # what is in the way, the writer says
+        out.parent.mkdir(parents=True, exist_ok=True)
     write_packing(packing, out)
     print(f"wrote {out}: {len(packing)} spheres, in metres")
     lost = [

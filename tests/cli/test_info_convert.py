@@ -89,7 +89,7 @@ def test_convert_keeps_the_spheres(tmp_path, suffix):
         (["info", "{d}/bed.csv", "--out", "{d}/bed.csv"], "cannot write to this folder"),
         (["convert", "{d}/bed.csv", "{d}/bed.csv"], "this is the input file itself"),
         (["convert", "{d}/bed.csv", "{d}/bed.xyz"], "no writer for the extension '.xyz'"),
-        (["convert", "{d}/bed.csv", "{d}/bed.csv/bed.h5"], "cannot write to this folder"),
+        (["convert", "{d}/bed.csv", "{d}/bed.csv/bed.h5"], "cannot write this file"),
     ],
 )
 def test_one_sentence_and_exit_code_2(tmp_path, capsys, words, message):
