@@ -115,7 +115,7 @@ def test_a_task_that_ends_its_workers_is_given_up(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "said"),
-    [("jobs = 0\n[slurm]\n", "jobs = N"), ("[slurm]\n", "jobs = N"), ("jobs", "read as TOML")],
+    [("jobs = 0\n[slurm]\n", "jobs = N"), ("[slurm]\n", "jobs = N"), ("jobs", "not valid TOML")],
 )
 def test_wrong_slurm_files_are_refused(tmp_path, text, said):
     path = tmp_path / "slurm.toml"
