@@ -144,7 +144,7 @@ def test_commands_of_the_verb_table(tmp_path, small_run, small_quickstart):
             lines.append(command)
     done = shell("\n".join(lines), tmp_path)
     assert done.returncode == 0, f"{done.stdout}\n{done.stderr}"
-    assert (tmp_path / "bed.vtu").is_file()
+    assert (tmp_path / "runs/bed.vtu").is_file()
     for file in ("bed.h5", "traced/view_factors.h5", "small.h5", "heated_bed/summary.json"):
         assert (tmp_path / "runs" / file).is_file()
 
