@@ -294,9 +294,13 @@ def _number(value: Any, dimension: str, place: _Place) -> float:
             f"{place} = {value!r} must be a {dimension}: a number{_unit(dimension)} or a string "
             "with a unit."
         )
-    if not math.isfinite(value):
+    try:
+        number = float(value)
+    except OverflowError:  # an integer of more than 308 digits
+        number = math.inf
+    if not math.isfinite(number):
         raise InputError(f"{place} = {value}{_unit(dimension)} must be finite; mend it.")
-    return float(value)
+    return number
 
 
 def _bounded(value: Any, rules: Mapping[str, Any], place: _Place) -> Any:

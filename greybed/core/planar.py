@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 PLANAR = 1e-5
 # A triangle of less area than this times the square of its longest edge is a line.
 DEGENERATE = 1e-14
+# Corners beyond are an error of the file; fourth powers of much more would overflow [m].
+FARTHEST = 1e9
 
 
 @dataclass(frozen=True)
@@ -214,6 +216,12 @@ class Mesh:
         if not np.isfinite(points).all():
             bad = int((~np.isfinite(points)).any(axis=1).argmax())
             raise InputError(f"{what}: corner {bad} is not finite; mend or remove its triangles.")
+        if np.abs(points).max() > FARTHEST:
+            bad = int((np.abs(points) > FARTHEST).any(axis=1).argmax())
+            raise InputError(
+                f"{what}: corner {bad} is farther than {FARTHEST:g} m from the origin; mend it, or "
+                "state the unit of the file."
+            )
         # Adding zero turns -0.0 into 0.0: corners are told apart by their bytes.
         points, place = np.unique(points + 0.0, axis=0, return_inverse=True)
         index = place.reshape(-1)[index.astype(np.int64)]

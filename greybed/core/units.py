@@ -111,6 +111,7 @@ def to_si(values: ArrayLike, unit: str, dimension: str, where: str) -> NDArray[n
         ) from None
     except (
         pint.PintError,
+        AssertionError,  # pint's own, of a text that is no unit
         ArithmeticError,
         AttributeError,
         LookupError,

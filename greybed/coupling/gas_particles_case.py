@@ -135,7 +135,7 @@ class GasParticlesCase(ParticleCase):
         )
         if solid > PACKED * volume:
             raise InputError(
-                f"particles of {solid:.3g} [m3] would fill {solid / volume:.2f} of the grid, more "
+                f"particles of {solid:.3g} [m3] would fill {solid / max(volume, 1e-300):.3g} of the grid, more "
                 f"than {PACKED} [-], the densest packing; insert fewer, or widen the grid."
             )
 

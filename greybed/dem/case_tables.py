@@ -286,7 +286,7 @@ class _Drawn(_Sourced):
 class PackTable(_Drawn):
     """``[[particles]]`` with ``kind = "pack"``: all at once, at random places that are free."""
 
-    count: int = whole(at_least=1)
+    count: int = whole(at_least=1, at_most=10**8)
     at: float = quantity("time", 0.0, at_least=0.0)  # [s]
 
 

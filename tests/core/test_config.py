@@ -144,3 +144,10 @@ def test_missing_or_binary_file_is_refused(tmp_path):
     (tmp_path / "b.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match="not valid TOML"):
         read_toml(tmp_path / "b.toml")
+
+
+def test_a_number_too_large_for_a_float_is_refused(tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text(f'mode = "steady"\n[inner]\ntemperature = {"9" * 400}\n')
+    with pytest.raises(InputError, match=r"inner\.temperature = 9+ \[K\] must be finite"):
+        read_case(path, Case)

@@ -54,6 +54,7 @@ def test_normals_of_a_box_point_inwards():
         (lambda: Cone((0, 0, 0), (0, 0, 1), -1.0, 1.0, 1.0), "at least 0"),
         (lambda: Cone((0, 0, 0), (0, 0, 1), 1.0, 1.0, math.inf), "length"),
         (lambda: Mesh([], []), "empty"),
+        (lambda: Mesh(1e10 * np.asarray(CUBE), FACES), r"farther than 1e\+09 m from the origin"),
         (lambda: Mesh(CUBE, FACES[:0]), "empty"),
         (lambda: Mesh(CUBE, [[0, 1, 8]]), "corner numbers"),
         (lambda: Mesh(CUBE, [[0, 1, -1]]), "corner numbers"),

@@ -37,6 +37,7 @@ def test_quantity(text, dimension, expected):
         ("1e999 m", r"--r: '1e999 m' is not finite"),
         ("1 m**9**9**9**9", r"is not known"),
         ("1 (m)", r"is not known"),
+        ("1 mm𝟛", r"is not known"),  # a digit that pint takes for no number
         ("1 m0", r"is not known"),
         ("1 __import__('os')", r"is not known"),
         ("1 " + "m*" * 50 + "m", r"is not known"),
