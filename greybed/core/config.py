@@ -126,9 +126,10 @@ def read_toml(path: str | os.PathLike[str]) -> dict[str, Any]:
     try:
         with open(path, "rb") as stream:
             content = stream.read(LARGEST + 1)  # a device may never end
-    except OSError as error:
-        reason = error.strerror or error
-        raise InputError(f"{path}: cannot read this case ({reason}); check the path.") from None
+    except (OSError, ValueError) as error:  # a name that holds a null is a ValueError
+        reason = getattr(error, "strerror", None) or error
+        place = str(path).replace("\0", "\\0")
+        raise InputError(f"{place}: cannot read this case ({reason}); check the path.") from None
     if len(content) > LARGEST:
         raise InputError(
             f"{path}: a case of more than {LARGEST} bytes is none; give large tables as files."
@@ -312,7 +313,8 @@ def _bounded(value: Any, rules: Mapping[str, Any], place: _Place) -> Any:
     limits += [f"at least {low:g}"] if low > -math.inf else []
     limits += [f"at most {high:g}"] if high < math.inf else []
     unit = _unit(rules["dimension"]) if "dimension" in rules else " [-]"
-    raise InputError(f"{place} = {value:g}{unit} must be {' and '.join(limits)}; mend it.")
+    shown = value if isinstance(value, int) else f"{value:g}"  # some integers fit in no float
+    raise InputError(f"{place} = {shown}{unit} must be {' and '.join(limits)}; mend it.")
 
 
 def _choice(value: Any, options: tuple[str, ...], place: _Place) -> str:

@@ -139,10 +139,11 @@ class FlowRun:
         if numbers.get("format") != FORMAT or numbers.get("key") != key:
             return False
         try:
+            history, done = list(numbers["history"]), int(numbers["done"])
             self.flow.restore(arrays)
-        except (KeyError, ValueError) as error:
+        except (KeyError, TypeError, ValueError) as error:
             raise InputError(
                 f"{path}: this checkpoint does not fit its case ({error}); delete it."
             ) from None
-        self.history, self.done = list(numbers["history"]), int(numbers["done"])
+        self.history, self.done = history, done
         return True

@@ -134,8 +134,9 @@ class GasParticlesCase(ParticleCase):
             if isinstance(t, PackTable) and t.sizes is not None
         )
         if solid > PACKED * volume:
+            share = solid / max(volume, 1e-300)
             raise InputError(
-                f"particles of {solid:.3g} [m3] would fill {solid / max(volume, 1e-300):.3g} of the grid, more "
+                f"particles of {solid:.3g} [m3] would fill {share:.3g} of the grid, more "
                 f"than {PACKED} [-], the densest packing; insert fewer, or widen the grid."
             )
 

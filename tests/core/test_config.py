@@ -146,8 +146,16 @@ def test_missing_or_binary_file_is_refused(tmp_path):
         read_toml(tmp_path / "b.toml")
 
 
+def test_a_path_with_a_null_is_refused():
+    with pytest.raises(InputError, match=r"a\\0b\.toml: cannot read this case .*null"):
+        read_toml("a\0b.toml")
+
+
 def test_a_number_too_large_for_a_float_is_refused(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(f'mode = "steady"\n[inner]\ntemperature = {"9" * 400}\n')
     with pytest.raises(InputError, match=r"inner\.temperature = 9+ \[K\] must be finite"):
+        read_case(path, Case)
+    path.write_text(f'mode = "steady"\n[inner]\nrays = {"9" * 400}\n')
+    with pytest.raises(InputError, match=r"inner\.rays = 9+ \[-\] must be at least 1 and at most"):
         read_case(path, Case)
