@@ -17,6 +17,7 @@ from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 from greybed.core.errors import InputError
 
 T = TypeVar("T")
+_FLOATS = 10**300  # integers below fit in a float
 LARGEST = 1 << 22  # bytes of a file; a case has a few thousand
 # Tables within tables, as dotted keys; no case has more than four, and reading so many takes time
 # that grows with their square.
@@ -313,7 +314,7 @@ def _bounded(value: Any, rules: Mapping[str, Any], place: _Place) -> Any:
     limits += [f"at least {low:g}"] if low > -math.inf else []
     limits += [f"at most {high:g}"] if high < math.inf else []
     unit = _unit(rules["dimension"]) if "dimension" in rules else " [-]"
-    shown = value if isinstance(value, int) else f"{value:g}"  # some integers fit in no float
+    shown = f"{value:g}" if abs(value) < _FLOATS else value
     raise InputError(f"{place} = {shown}{unit} must be {' and '.join(limits)}; mend it.")
 
 
