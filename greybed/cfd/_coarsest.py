@@ -1,7 +1,8 @@
 """Compiled: the coarsest grid of a multigrid cycle, solved as a whole."""
 
 import numpy as np
-from numba import njit
+
+from greybed.core.jit import njit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 

@@ -5,7 +5,7 @@ two more on every side; fluxes through control faces hold one more along their o
 whose ``c`` (one over the spacing) is 0 has no extent.
 """
 
-from numba import njit
+from greybed.core.jit import njit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 

@@ -1,6 +1,6 @@
 """Compiled parts of a step that work face by face; arrays are flat."""
 
-from numba import njit
+from greybed.core.jit import njit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 

@@ -8,7 +8,8 @@ branches in them, which compilers turn into vector instructions.
 """
 
 import numpy as np
-from numba import njit
+
+from greybed.core.jit import njit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 

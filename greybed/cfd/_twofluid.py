@@ -8,7 +8,8 @@ axis ``b``; a stride ``sa`` of 0 is a cell.
 """
 
 import numpy as np
-from numba import njit
+
+from greybed.core.jit import njit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 

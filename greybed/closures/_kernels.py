@@ -1,6 +1,6 @@
 """Compiled evaluation of forests."""
 
-from numba import njit
+from greybed.core.jit import njit
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
-from numba import njit
 
 from greybed.closures.drag._kernels import drag
+from greybed.core.jit import njit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 

@@ -1,7 +1,8 @@
 """Compiled implicit diffusion along one axis of a grid, line by line."""
 
 import numpy as np
-from numba import njit
+
+from greybed.core.jit import njit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 

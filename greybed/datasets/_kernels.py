@@ -10,7 +10,8 @@ runs along z through the middle of the box.
 import math
 
 import numpy as np
-from numba import njit
+
+from greybed.core.jit import njit
 
 RUNNING, DONE, JAMMED = 0, 1, 2
 

@@ -7,8 +7,8 @@ which are filled. What each row is stands in ``_columns.py``.
 import math
 
 import numpy as np
-from numba import njit
 
+from greybed.core.jit import njit
 from greybed.dem import _columns as col
 from greybed.dem._cohesion import bridges, energy_density, jkr, pull_off, van_der_waals
 from greybed.dem._rolling import constant_torque, rolling_spring, viscous_torque

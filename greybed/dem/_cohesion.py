@@ -2,8 +2,7 @@
 
 import math
 
-from numba import njit
-
+from greybed.core.jit import njit
 from greybed.dem import _columns as col
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}

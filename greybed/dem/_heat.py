@@ -1,8 +1,8 @@
 """Compiled contacts of particles with walls, for the heat that goes through them."""
 
 import numpy as np
-from numba import njit
 
+from greybed.core.jit import njit
 from greybed.dem import _columns as col
 from greybed.dem._surfaces import nearest
 

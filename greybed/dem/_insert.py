@@ -1,7 +1,8 @@
 """Compiled insertion: random places for spheres that touch neither each other nor what is there."""
 
 import numpy as np
-from numba import njit
+
+from greybed.core.jit import njit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 

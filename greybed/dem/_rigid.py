@@ -4,7 +4,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+
+from greybed.core.jit import njit, prange
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 

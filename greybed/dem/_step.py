@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
 
+from greybed.core.jit import njit, prange
 from greybed.dem._batch import empty_batch
 from greybed.dem._pairs import block_forces
 from greybed.dem._rigid import kick_bodies

@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
 
+from greybed.core.jit import njit
 from greybed.dem import _columns as col
 from greybed.dem._batch import solve
 from greybed.dem._cohesion import attraction, bridge, neck

@@ -10,7 +10,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from greybed.core.jit import njit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from greybed.core.jit import njit
 from greybed.core.walls import Cone, Cylinder, Disc, Mesh, Polygon, Wall
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}

@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
 
+from greybed.core.jit import njit
 from greybed.raytrace._streams import GOLDEN, MIX_2, draw, mix
 from greybed.raytrace._walls import behind, crosses, wall_hit
 

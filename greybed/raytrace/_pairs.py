@@ -8,8 +8,8 @@ integral as weight. So F = F_exact * (free weight / weight), and the rays decide
 import math
 
 import numpy as np
-from numba import njit
 
+from greybed.core.jit import njit
 from greybed.raytrace._sobol import scrambled, turn
 from greybed.raytrace._streams import GOLDEN, MIX_1, MIX_2, S32, mix
 from greybed.raytrace._walls import wall_hit

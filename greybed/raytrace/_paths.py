@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 
 from greybed.core.errors import InputError
+from greybed.core.jit import njit
 from greybed.core.walls import Cone, Cylinder, Disc, Mesh, Plane, Polygon, Wall
 from greybed.raytrace._emission import emitters
 from greybed.raytrace._kernels import (

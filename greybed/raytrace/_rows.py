@@ -4,8 +4,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from greybed.core.jit import njit
 from greybed.raytrace._blocks import (
     distance_of,
     first_neighbours,

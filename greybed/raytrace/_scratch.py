@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from greybed.core.jit import njit
 from greybed.raytrace._blocks import BLOCK, Room, room_for_blocks
 from greybed.raytrace._bundle import MOST
 

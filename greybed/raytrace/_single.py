@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from greybed.core.jit import njit
 from greybed.raytrace._grid import Grid
 from greybed.raytrace._kernels import ESCAPED, redraw
 from greybed.raytrace._rows import at_limit, march_on, slot_for, store

@@ -9,7 +9,8 @@ by a hash of the bits above it. The hash works on reversed bits, so the sequence
 import math
 
 import numpy as np
-from numba import njit
+
+from greybed.core.jit import njit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 

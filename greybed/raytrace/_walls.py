@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from greybed.core import patches as bounded
 from greybed.core._kernels import patch_hit, triangle_hit
+from greybed.core.jit import njit
 from greybed.core.walls import Cylinder, Plane, Wall
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}

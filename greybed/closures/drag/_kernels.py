@@ -2,7 +2,7 @@
 
 import math
 
-from numba import njit
+from greybed.core.jit import njit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
