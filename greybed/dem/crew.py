@@ -34,8 +34,10 @@ def run_steps(
     """
     team = np.zeros(_step.SHARED, np.int64)
     team[_step.TICKET] = _step.NO_WORK
-    few = steps * len(state.place) < WORTH_HELP or numba.config.DISABLE_JIT
-    helpers = 0 if few else min(threads, len(near.block) - 1) - 1
+    # What finishes a run is a tenth of a step.
+    few = order == _step.FINISH or steps * len(state.place) < WORTH_HELP
+    alone = few or numba.config.DISABLE_JIT
+    helpers = 0 if alone else min(threads, len(near.block) - 1) - 1
     given = (team, state, near, *others)
     crew = [
         Thread(target=_step.work, args=(order, steps, False, *given), daemon=True)

@@ -58,4 +58,4 @@ def test_parts_cover_all_once_and_in_order(monkeypatch, threads, count):
     monkeypatch.setattr(crew, "WORTH_PARTS", 0)
     parts = crew.in_parts(threads, count, lambda begin, end: list(range(begin, end)))
     assert len(parts) == threads
-    assert sum(parts, []) == list(range(count))
+    assert [k for part in parts for k in part] == list(range(count))
