@@ -8,8 +8,6 @@ from numba import config, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from greybed.core.jit import njit
-
 _X86 = platform.machine().lower() in ("x86_64", "amd64", "i686")
 
 
@@ -88,9 +86,3 @@ if config.DISABLE_JIT:
     add, look, put, rest = _plain_add, _plain_look, _plain_put, _plain_rest
 else:
     add, look, put, rest = map(intrinsic, (_add, _look, _put, _rest))
-
-
-@njit(cache=True)
-def put_from_outside(array, index, number):
-    """The same for callers that are not compiled."""
-    put(array, index, number)

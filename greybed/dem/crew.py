@@ -10,7 +10,7 @@ from typing import TypeVar
 import numba
 import numpy as np
 
-from greybed.dem import _share, _step
+from greybed.dem import _step
 
 _Result = TypeVar("_Result")
 
@@ -49,7 +49,7 @@ def run_steps(
         return _step.work(order, steps, True, *given)
     finally:
         # Also where this thread is interrupted before it leads.
-        _share.put_from_outside(team, _step.TICKET, _step.STOP)
+        team[_step.TICKET] = _step.STOP
         for helper in crew:
             if helper.is_alive():
                 helper.join()
