@@ -11,7 +11,6 @@ reaches.
 """
 
 import uuid
-from collections.abc import Callable
 from typing import Any
 
 import numba
@@ -22,19 +21,19 @@ from numba.core.caching import IndexDataCacheFile
 __all__ = ["njit", "prange"]
 
 
-def _plain(function: Callable[..., Any] | None = None, **options: Any) -> Any:
+def _plain(function: Any = None, **options: Any) -> Any:
     """Leave a kernel as it is, but silent about what compiled code does not speak of.
 
     Random streams wrap their integers around, and what an array holds may be divided by 0.
     """
     if function is None:
         return _plain
-    kernel = np.errstate(all="ignore")(function)
+    kernel: Any = np.errstate(all="ignore")(function)
     kernel.py_func = function
     return kernel
 
 
-njit = _plain if config.DISABLE_JIT else numba.njit
+njit: Any = _plain if config.DISABLE_JIT else numba.njit
 
 
 def _unique_name(self: IndexDataCacheFile, number: int) -> str:
