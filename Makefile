@@ -25,7 +25,7 @@ test: $(STAMP)   ## lint, types, import contracts, tests
 
 # Compiled lines cannot be seen: kernels are left out of the one, and are all there is of the other.
 KERNELS := greybed/*/_[a-z]*.py,greybed/*/*/_[a-z]*.py,greybed/*/*/*/_[a-z]*.py
-coverage: $(STAMP) ## branches that the tests reach outside kernels, at least 90 %; an hour
+coverage: $(STAMP) ## branches that the tests reach outside kernels, at least 90 %
 	$(BIN)/coverage erase
 	OPENBLAS_NUM_THREADS=1 $(BIN)/coverage run -m pytest -n 2 --dist worksteal
 	$(BIN)/coverage combine --quiet
