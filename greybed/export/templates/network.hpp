@@ -3,7 +3,7 @@ constexpr int N_RAW = {{ layers[-1][1] }};
 constexpr int N_VALUES = {{ layers[-1][1] - 1 }};
 
 {% for isa in ["", "_avx2"] %}
-{% set lanes = "shared2::avx2::" if isa else "shared2::" %}
+{% set lanes = "shared3::avx2::" if isa else "shared3::" %}
 {% if isa %}
 #if defined(GREYBED_DISPATCHES)
 #if defined(__clang__)
