@@ -95,7 +95,7 @@ GREYBED_DEVICE inline void kept(const double* m, const Features& f, double g, co
   double logs[4];
   v4 bent = four(raw[0] / {{ log_bound }}, raw[1] / {{ log_bound }}, 0.0, 0.0);
   v4 bent_slope;
-  Bent::squash(bent, bent_slope);
+  squash<Bent>(bent, bent_slope);
   store(bent * four({{ log_bound }}), logs);
   store(bent_slope, slope);
   const double log_along = logs[0];

@@ -78,7 +78,7 @@ GREYBED_HOT double rest_of(double x) { return x < 1.0 ? 1.0 - x : 0.0; }
 GREYBED_DEVICE inline double tanh_of(double x) {
   v4 y = four(x < -20.0 ? -20.0 : (x > 20.0 ? 20.0 : x));
   v4 slope;
-  Tanh::squash(y, slope);
+  squash<Tanh>(y, slope);
   double all[4];
   store(y, all);
   return all[0];

@@ -58,7 +58,7 @@ inline const char* outputs() {
 }
 
 namespace detail {
-using namespace greybed::shared2;
+using namespace greybed::shared3;
 
 {% for table in tables %}
 GREYBED_DEVICE inline const {{ table.ctype }}* {{ table.name }}() {

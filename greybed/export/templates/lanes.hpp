@@ -35,18 +35,12 @@ GREYBED_HOT double root(double x) { return std::sqrt(x); }
 GREYBED_HOT double larger(double x, double y) { return x < y ? y : x; }
 GREYBED_HOT double smaller(double x, double y) { return x < y ? x : y; }
 GREYBED_HOT double total(double v) { return v; }
-/// The whole number k next to y, |y| < 2000, and in its bits for times_power. No step relies on the
-/// order of rounding.
-GREYBED_HOT void rounded(double y, double& k, double& bits) {
-  k = bits = static_cast<double>(static_cast<int>(y + (y < 0.0 ? -0.5 : 0.5)));
-}
-/// x 2^k by its exponent; neither is 0 or tiny.
-GREYBED_HOT double times_power(double x, double k) {
-  std::uint64_t whole;
-  std::memcpy(&whole, &x, sizeof x);
-  whole += static_cast<std::uint64_t>(static_cast<std::int64_t>(k)) << 52;
-  std::memcpy(&x, &whole, sizeof x);
-  return x;
+/// The whole number k next to y, |y| < 1022, and 2^k. No step relies on the order of rounding.
+GREYBED_HOT void rounded(double y, double& k, double& power) {
+  const std::int64_t whole = static_cast<std::int64_t>(y + (y < 0.0 ? -0.5 : 0.5));
+  const std::uint64_t bits = static_cast<std::uint64_t>(whole + 1023) << 52;
+  std::memcpy(&power, &bits, sizeof power);
+  k = static_cast<double>(whole);
 }
 /// x = 2^k z with sqrt(1/2) <= z < sqrt(2), for positive x that is not tiny.
 GREYBED_HOT void parted(double x, double& k, double& z) {
@@ -72,16 +66,17 @@ GREYBED_HOT d2 smaller(const d2& x, const d2& y) { return _mm_min_pd(x, y); }
 /// A number that the compiler knows nothing of from here on.
 GREYBED_HOT void hide(d2& v) { __asm__("" : "+x"(v)); }
 GREYBED_HOT double total(const d2& v) { return v[0] + v[1]; }
-GREYBED_HOT void rounded(const d2& y, d2& k, d2& bits) {
-  const d2 magic = _mm_set1_pd(6755399441055744.0);  // 1.5 * 2^52: adding it rounds
-  bits = y + magic;
+/// An exponent in the last bits of a number, as a power of two.
+GREYBED_HOT d2 power_of(const d2& bits) {
+  return _mm_castsi128_pd(_mm_slli_epi64(_mm_castpd_si128(bits), 52));
+}
+GREYBED_HOT void rounded(const d2& y, d2& k, d2& power) {
+  const d2 magic = _mm_set1_pd(6755399441056767.0);  // 1.5 * 2^52 + 1023: adding it rounds
+  d2 bits = y + magic;
   hide(bits);  // -ffast-math would put what is added and what is taken off together,
   k = bits - magic;
   hide(k);  // ... or share out a product
-}
-GREYBED_HOT d2 times_power(const d2& x, const d2& bits) {
-  return _mm_castsi128_pd(
-      _mm_add_epi64(_mm_castpd_si128(x), _mm_slli_epi64(_mm_castpd_si128(bits), 52)));
+  power = power_of(bits);
 }
 GREYBED_HOT void parted(const d2& x, d2& k, d2& z) {
   const __m128i bits = _mm_castpd_si128(x);
@@ -110,24 +105,35 @@ GREYBED_HOT d4 larger(const d4& x, const d4& y) { return _mm256_max_pd(x, y); }
 GREYBED_HOT d4 smaller(const d4& x, const d4& y) { return _mm256_min_pd(x, y); }
 GREYBED_HOT void hide(d4& v) { __asm__("" : "+x"(v)); }
 GREYBED_HOT double total(const d4& v) { return (v[0] + v[1]) + (v[2] + v[3]); }
-GREYBED_HOT void rounded(const d4& y, d4& k, d4& bits) {
-  const d4 magic = _mm256_set1_pd(6755399441055744.0);
-  bits = y + magic;
-  hide(bits);
-  k = bits - magic;
-  hide(k);
-}
-GREYBED_HOT d4 times_power(const d4& x, const d4& bits) {
+GREYBED_HOT d4 power_of(const d4& bits) {
 #if defined(__AVX2__) || defined(GREYBED_AVX2)
-  return _mm256_castsi256_pd(
-      _mm256_add_epi64(_mm256_castpd_si256(x), _mm256_slli_epi64(_mm256_castpd_si256(bits), 52)));
+  return _mm256_castsi256_pd(_mm256_slli_epi64(_mm256_castpd_si256(bits), 52));
 #else
-  const d2 low = times_power(_mm256_castpd256_pd128(x), _mm256_castpd256_pd128(bits));
-  const d2 high = times_power(_mm256_extractf128_pd(x, 1), _mm256_extractf128_pd(bits, 1));
+  const d2 low = power_of(_mm256_castpd256_pd128(bits));
+  const d2 high = power_of(_mm256_extractf128_pd(bits, 1));
   return _mm256_insertf128_pd(_mm256_castpd128_pd256(low), high, 1);
 #endif
 }
+GREYBED_HOT void rounded(const d4& y, d4& k, d4& power) {
+  const d4 magic = _mm256_set1_pd(6755399441056767.0);
+  d4 bits = y + magic;
+  hide(bits);
+  k = bits - magic;
+  hide(k);
+  power = power_of(bits);
+}
 GREYBED_HOT void parted(const d4& x, d4& k, d4& z) {
+#if defined(__AVX2__) || defined(GREYBED_AVX2)
+  const __m256i bits = _mm256_castpd_si256(x);
+  const __m256i e = _mm256_srli_epi64(
+      _mm256_add_epi64(bits, _mm256_set1_epi64x((1023LL << 52) - 0x3fe6a09e667f3bcdLL)), 52);
+  z = _mm256_castsi256_pd(_mm256_sub_epi64(
+      bits, _mm256_slli_epi64(_mm256_sub_epi64(e, _mm256_set1_epi64x(1023)), 52)));
+  k = _mm256_castsi256_pd(_mm256_or_si256(e, _mm256_set1_epi64x(0x4330000000000000LL)));
+  hide(k);
+  k = k - _mm256_set1_pd(4503599627371519.0);
+  hide(k);
+#else
   d2 low = _mm256_castpd256_pd128(x);
   d2 high = _mm256_extractf128_pd(x, 1);
   d2 k_low;
@@ -136,6 +142,7 @@ GREYBED_HOT void parted(const d4& x, d4& k, d4& z) {
   parted(high, k_high, high);
   k = _mm256_insertf128_pd(_mm256_castpd128_pd256(k_low), k_high, 1);
   z = _mm256_insertf128_pd(_mm256_castpd128_pd256(low), high, 1);
+#endif
 }
 #endif
 
@@ -177,23 +184,17 @@ GREYBED_HOT d8 root(const d8& x) {
   root_of(x, r);
   return r;
 }
-GREYBED_HOT void rounded(const d8& y, d8& k, d8& bits) {
+GREYBED_HOT void rounded(const d8& y, d8& k, d8& power) {
   d8 magic;
-  spread(6755399441055744.0, magic);
-  bits = y + magic;
+  spread(6755399441056767.0, magic);
+  d8 bits = y + magic;
   hide(bits);
   k = bits - magic;
   hide(k);
-}
-GREYBED_HOT d8 times_power(const d8& x, const d8& bits) {
   i8 whole;
-  i8 power;
-  std::memcpy(&whole, &x, sizeof x);
-  std::memcpy(&power, &bits, sizeof bits);
-  whole += power << 52;
-  d8 r;
-  std::memcpy(&r, &whole, sizeof r);
-  return r;
+  std::memcpy(&whole, &bits, sizeof whole);
+  whole <<= 52;
+  std::memcpy(&power, &whole, sizeof power);
 }
 #endif
 
@@ -237,14 +238,9 @@ GREYBED_HOT double total(const Two<L>& v) {
   return total(v.a) + total(v.b);
 }
 template <class L>
-GREYBED_HOT void rounded(const Two<L>& y, Two<L>& k, Two<L>& bits) {
-  rounded(y.a, k.a, bits.a);
-  rounded(y.b, k.b, bits.b);
-}
-template <class L>
-GREYBED_HOT Two<L> times_power(const Two<L>& x, const Two<L>& bits) {
-  const Two<L> r = {times_power(x.a, bits.a), times_power(x.b, bits.b)};
-  return r;
+GREYBED_HOT void rounded(const Two<L>& y, Two<L>& k, Two<L>& power) {
+  rounded(y.a, k.a, power.a);
+  rounded(y.b, k.b, power.b);
 }
 template <class L>
 GREYBED_HOT void parted(const Two<L>& x, Two<L>& k, Two<L>& z) {

@@ -155,18 +155,18 @@ struct Layer<IN, WIDTH, 0> {
   static GREYBED_HOT void run(const double*, const double*, const double*, double*) {}
 };
 
-/// N numbers, a multiple of four, through the bend of their layer, in place; slopes too if they are wanted. Several at
-/// once: none waits for the others.
+/// N numbers, a multiple of four, through the bend of their layer, in place; slopes too if they are wanted. Sixteen at
+/// once, for a step waits for the one before it.
 template <int N, class Bend, bool SLOPES>
 struct Bending {
-  typedef typename Choice<(N >= 8), v8, v4>::type Lanes;
+  typedef typename Choice<(N >= 16), Two<v8>, typename Choice<(N >= 8), v8, v4>::type>::type Lanes;
   static constexpr int NOW = sizeof(Lanes) / sizeof(double);
 
   static GREYBED_HOT void run(double* x, double* slope) {
     Lanes v;
     Lanes s;
     load(x, v);
-    Bend::squash(v, s);
+    squash<Bend>(v, s);
     store(v, x);
     if (SLOPES) store(s, slope);
     Bending<N - NOW, Bend, SLOPES>::run(x + NOW, SLOPES ? slope + NOW : slope);
@@ -175,6 +175,38 @@ struct Bending {
 template <class Bend, bool SLOPES>
 struct Bending<0, Bend, SLOPES> {
   static GREYBED_HOT void run(double*, double*) {}
+};
+
+/// A layer whose inputs are still to be bent, in place: the steps of four of them go between the products of those
+/// before, for a step waits for the one before it, and processors look ahead too little to fill that time.
+template <int IN, int WIDTH, int LEFT, class Bend, bool SLOPES>
+struct BentLayer {
+  static constexpr int NOW = LEFT < TOGETHER ? LEFT : TOGETHER;
+  static constexpr int AHEAD = IN < 8 ? IN : 8;
+
+  static GREYBED_HOT void run(double* x, double* slope, const double* weight, const double* bias, double* y) {
+    Bending<AHEAD, Bend, SLOPES>::run(x, slope);
+    Sums<NOW> sums;
+    sums.get(bias);
+    for (int i = 0; i < IN - AHEAD; i += 4) {
+      typename Bend::template Steps<v4> steps;
+      load(x + AHEAD + i, steps.x);
+      const double* const w = weight + WIDTH * i;
+      steps.first();
+      sums.add(w, eight(x[i]));
+      steps.second();
+      sums.add(w + WIDTH, eight(x[i + 1]));
+      steps.third();
+      sums.add(w + 2 * WIDTH, eight(x[i + 2]));
+      steps.fourth();
+      sums.add(w + 3 * WIDTH, eight(x[i + 3]));
+      store(steps.x, x + AHEAD + i);
+      if (SLOPES) store(steps.slope, slope + AHEAD + i);
+    }
+    for (int i = IN - AHEAD; i < IN; ++i) sums.add(weight + WIDTH * i, eight(x[i]));
+    sums.put(y);
+    Layer<IN, WIDTH, LEFT - NOW>::run(x, weight + 4 * NOW, bias + 4 * NOW, y + 4 * NOW);
+  }
 };
 
 /// N numbers brought between -20 and 20, where tanh rounds to -1 and 1.

@@ -150,7 +150,7 @@ const {{ name }}_library library = {
 #undef GREYBED_AVX2
 #undef GREYBED_VECTORS
 #undef GREYBED_WIDE
-#undef GREYBED_SHARED_2
+#undef GREYBED_SHARED_3
 #undef {{ guard }}
 #define GREYBED_NO_DISPATCH 1
 #endif  // GREYBED_DISPATCH

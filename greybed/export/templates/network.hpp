@@ -3,7 +3,7 @@ constexpr int N_RAW = {{ layers[-1][1] }};
 constexpr int N_VALUES = {{ layers[-1][1] - 1 }};
 
 {% for isa in ["", "_avx2"] %}
-{% set lanes = "shared2::avx2::" if isa else "shared2::" %}
+{% set lanes = "shared3::avx2::" if isa else "shared3::" %}
 {% if isa %}
 #if defined(GREYBED_DISPATCHES)
 #if defined(__clang__)
@@ -24,7 +24,11 @@ GREYBED_DEVICE inline void network_as{{ isa }}(const double* features, double* r
 {% for n_in, n_out in layers[:-1] %}
   double x_{{ loop.index }}[{{ n_out }}];
   double s_{{ loop.index }}[{{ n_out }}];
-  {{ lanes }}Layer<{{ n_in }}, {{ n_out }}, {{ n_out // 4 }}>::run(x_{{ loop.index0 }}, weight_{{ loop.index0 }}(), bias_{{ loop.index0 }}(), x_{{ loop.index }});
+{% if loop.first %}
+  {{ lanes }}Layer<{{ n_in }}, {{ n_out }}, {{ n_out // 4 }}>::run(x_0, weight_0(), bias_0(), x_1);
+{% else %}
+  {{ lanes }}BentLayer<{{ n_in }}, {{ n_out }}, {{ n_out // 4 }}, {{ lanes }}{{ bend }}, (GRADIENT > 0)>::run(x_{{ loop.index0 }}, s_{{ loop.index0 }}, weight_{{ loop.index0 }}(), bias_{{ loop.index0 }}(), x_{{ loop.index }});
+{% endif %}
 {% if loop.first and reaches %}
   double reach = {{ reaches[0] }};  // bounds what goes into a bend
 {% for most in reaches[1:] %}
@@ -34,10 +38,10 @@ GREYBED_DEVICE inline void network_as{{ isa }}(const double* features, double* r
 {% elif loop.index in held %}
   {{ lanes }}hold<{{ n_out }}>(x_{{ loop.index }});
 {% endif %}
-  {{ lanes }}Bending<{{ n_out }}, {{ lanes }}{{ bend }}, (GRADIENT > 0)>::run(x_{{ loop.index }}, s_{{ loop.index }});
 {% endfor %}
 {% set top = layers|length - 1 %}
 {% set wide = layers[top][0] %}
+  {{ lanes }}Bending<{{ wide }}, {{ lanes }}{{ bend }}, (GRADIENT > 0)>::run(x_{{ top }}, s_{{ top }});
   for (int k = 0; k < ROWS; ++k) {
     raw[k] = {{ lanes }}dot<{{ wide // 4 }}>(x_{{ top }}, last() + {{ wide }} * k) + bias_{{ top }}()[k];
   }

@@ -34,8 +34,8 @@
 #define GREYBED_TYPE
 #endif
 
-#ifndef GREYBED_SHARED_2
-#define GREYBED_SHARED_2
+#ifndef GREYBED_SHARED_3
+#define GREYBED_SHARED_3
 
 // Functions that a graphics processor can run as well; define it yourself for other compilers.
 #ifndef GREYBED_DEVICE
@@ -89,7 +89,7 @@ struct GREYBED_TYPE Guard {
   }
 };
 
-namespace shared2 {
+namespace shared3 {
 
 GREYBED_DEVICE inline std::uint64_t as_bits(double v) {
   std::uint64_t bits;
@@ -150,12 +150,12 @@ GREYBED_DEVICE inline double logistic(double x) {
 
 {% include "dual.hpp" %}
 
-}  // namespace shared2
+}  // namespace shared3
 }  // namespace greybed
-#endif  // GREYBED_SHARED_2
+#endif  // GREYBED_SHARED_3
 {% if kind == "mlp" %}
-#if defined(GREYBED_DISPATCHES) && !defined(GREYBED_SHARED_2_AVX2)
-#define GREYBED_SHARED_2_AVX2 1
+#if defined(GREYBED_DISPATCHES) && !defined(GREYBED_SHARED_3_AVX2)
+#define GREYBED_SHARED_3_AVX2 1
 // The same for processors with AVX2 and FMA, inside a program that was compiled for any.
 #define GREYBED_AVX2 1
 #if defined(__clang__)
@@ -165,7 +165,7 @@ GREYBED_DEVICE inline double logistic(double x) {
 #pragma GCC target("avx2,fma")
 #endif
 namespace greybed {
-namespace shared2 {
+namespace shared3 {
 namespace avx2 {
 {% include "lanes.hpp" %}
 
@@ -173,7 +173,7 @@ namespace avx2 {
 
 {% include "layers.hpp" %}
 }  // namespace avx2
-}  // namespace shared2
+}  // namespace shared3
 }  // namespace greybed
 #if defined(__clang__)
 #pragma clang attribute pop
@@ -184,12 +184,12 @@ namespace avx2 {
 #undef GREYBED_WIDE
 
 namespace greybed {
-namespace shared2 {
+namespace shared3 {
 /// Whether this processor, and its system, has them.
 inline bool has_avx2() {
   return __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0;
 }
-}  // namespace shared2
+}  // namespace shared3
 }  // namespace greybed
 #endif
 
