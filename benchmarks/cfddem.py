@@ -27,6 +27,7 @@ from pathlib import Path
 
 import numpy as np
 
+from greybed.core.errors import InputError
 from greybed.coupling.gas_particles import GasParticles
 from greybed.dem.checkpoint import restore, save
 
@@ -39,15 +40,22 @@ START = 0.3  # [s]
 FOAM = "/usr/share/openfoam"  # of Debian's package, which needs no more of an environment
 
 
-def settled(work: Path):
-    """The settled bed, made once."""
-    sim, kept = khawaja.particles(threads=1), work / "settled.npz"
-    if kept.exists():
-        restore(sim, kept)
-    else:
+def flowing(work: Path) -> GasParticles:
+    """The bed in flow; its state is made once."""
+    kept, sim = work / "flowing.npz", khawaja.particles(threads=1)
+    try:
+        beside = restore(sim, kept)["beside"]
+    except InputError:  # none yet, or of another version
         sim.run(khawaja.SETTLE)
-        save(sim, kept)
-    return sim
+        both = khawaja.with_gas(sim, "gidaspow")
+        while both.time < START:
+            both.step()
+        save(sim, kept, beside={**both.gas.save(), **both.state()})
+        return both
+    both = khawaja.with_gas(sim, "gidaspow")
+    both.gas.restore(beside)
+    both.go_back(beside)
+    return both
 
 
 def timed(both: GasParticles, steps: int, count: int) -> dict[str, float]:
@@ -72,14 +80,6 @@ def timed(both: GasParticles, steps: int, count: int) -> dict[str, float]:
     spent["all"] = time.process_time() - begun
     both.simulation.run, both.gas.step = run, step
     return spent
-
-
-def flowing(work: Path) -> GasParticles:
-    """The bed in flow."""
-    both = khawaja.with_gas(settled(work), "gidaspow")
-    while both.time < START:
-        both.step()
-    return both
 
 
 def ours(both: GasParticles, gas_step: float, span: float) -> dict[str, float]:

@@ -151,16 +151,23 @@ class GasParticles:
         self.void, least, limited = self._void_of(overlaps)
         # What has moved since the last look took the time of the step before.
         rate = (self.void - before) / (self._passed or dt)
-        seen = self._read(gas.velocity)
-        terms = self._terms(overlaps, seen)
-        self._note(terms)
-        steady = self._steady(overlaps, terms, seen, dt)
-        k, target = self._linear(terms, seen, dt)
-        place = sim._state.place
-        total, aimed = self.transfer.give(place, k, target)
+        place, motion, law = sim._state.place, sim._state.motion, self.settings.plain
+        steady: Any = None
         loads: Any = None
-        if steady is not None:
-            loads, _ = self.transfer.give(place, -steady, np.zeros_like(steady))
+        if law is not None and len(place):
+            terms, self._rate, total, aimed = self.transfer.drag(
+                place, motion, overlaps, self.void, gas.velocity, law, gas.fluid, gas.model == "B"
+            )
+            k, target = terms.coefficient[:, None], motion
+        else:
+            seen = self._read(gas.velocity)
+            terms = self._terms(overlaps, seen)
+            self._note(terms)
+            steady = self._steady(overlaps, terms, seen, dt)
+            k, target = self._linear(terms, seen, dt)
+            total, aimed = self.transfer.give(place, k, target)
+            if steady is not None:
+                loads, _ = self.transfer.give(place, -steady, np.zeros_like(steady))
         volume = gas.grid.cell_volume
         none: Any = tuple(np.zeros(s) for s in gas.grid.face_shapes)
         if self.settings.treatment == "explicit":
@@ -178,7 +185,7 @@ class GasParticles:
             )
         at, order, warm = gas.velocity, sim._lists.ident, {}
         if self.heat is not None:
-            d = 2.0 * sim._state.place[:, 3]
+            d = 2.0 * place[:, 3]
             warm = self.heat.offer(
                 overlaps, self.smoother, terms.void, terms.reynolds, d, order, dt
             )
@@ -190,12 +197,11 @@ class GasParticles:
             self.heat.take(overlaps, self.smoother, report.heat, order, dt, sim)
         if self.settings.treatment != "explicit":
             at = report.velocity
-        pushed, sums = np.empty((len(place), 3)), np.empty((3, 3))
         by_gas = self.settings.pressure and gas.model == "A"
         slopes = self._slopes().reshape(-1, 3) if by_gas else _NOTHING
-        _exchange.forces_of(
-            k, self._read(at), target, _NOTHING if steady is None else steady, overlaps.first,
-            overlaps.cell, overlaps.volume, slopes, self._lift(), place, order, pushed, sums,
+        pushed, sums = self.transfer.forces(
+            place, at, k, target, _NOTHING if steady is None else steady, overlaps, slopes,
+            self._lift(), order,
         )  # fmt: skip
         given, parts, by_pressure = dt * sums
         lost = [dt * (b * u - a) for b, u, a in zip(total, at, aimed, strict=True)]

@@ -6,9 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from greybed.cfd.grid import Grid
+from greybed.closures.drag import DragLaw
 from greybed.coupling import _exchange
-from greybed.coupling.gas import Faces
-from greybed.coupling.void_fraction import Smoother
+from greybed.coupling.drag_exchange import DragTerms, refuse
+from greybed.coupling.gas import Faces, Fluid
+from greybed.coupling.void_fraction import Overlaps, Smoother
 
 Array = NDArray[np.float64]
 
@@ -39,18 +41,67 @@ class Transfer:
 
     def read(self, velocity: Faces, place: Array) -> Array:
         """Values of faces at particles (n, 4), (n, 3)."""
-        out, wide = np.empty((len(place), 3)), []
-        for axis, field in enumerate(velocity):
-            wide.append(np.empty([len(at) for at in self._from[axis]]))
-            smooth = np.ascontiguousarray(self.smoother.faces(field, axis))
-            _exchange.surround(smooth, *self._from[axis], wide[-1])
-        _exchange.read_faces(place, *self._shape, *(a.reshape(-1) for a in wide), out)
+        out = np.empty((len(place), 3))
+        _exchange.read_faces(place, *self._shape, *self._wide(velocity), out)
         return out
 
     def give(self, place: Array, k: Array, target: Array) -> tuple[list[Array], list[Array]]:
         """Sums of k (n, 3), or (n, 1), and of k target (n, 3) on faces: the transpose of read."""
-        sums = [np.zeros((*(len(at) for at in lists), 2)) for lists in self._from]
+        sums = self._none()
         _exchange.give_to_faces(place, *self._shape, k, target, *(a.reshape(-1) for a in sums))
+        return self._gathered(sums)
+
+    def drag(
+        self, place: Array, motion: Array, overlaps: Overlaps, void: Array, velocity: Faces,
+        law: DragLaw, fluid: Fluid, over: bool,
+    ) -> tuple[DragTerms, float, list[Array], list[Array]]:  # fmt: skip
+        """Drag of a law, if ``over`` over the void fraction, and what is given of it.
+
+        The second is the fastest relaxation of a particle [1/s]; the others are the sums of k and
+        of k times the particles' velocities on faces.
+        """
+        sums = self._none()
+        at, re, k, steep = np.empty((4, len(place)))
+        count, bad, fastest = _exchange.drag_both_ways(
+            place, motion, overlaps.first, overlaps.cell, overlaps.volume, void.reshape(-1),
+            law.code, *map(float, law.solids), float(law.reynolds), float(fluid.density),
+            float(fluid.viscosity), over, *self._shape, *self._wide(velocity),
+            *(a.reshape(-1) for a in sums), at, re, k, steep,
+        )  # fmt: skip
+        if bad >= 0:
+            refuse(float(law(1.0 - at[bad], re[bad])), 1.0 - at[bad], re[bad])
+        terms = DragTerms(k, steep, at, re, count / max(len(place), 1))
+        return terms, fastest, *self._gathered(sums)
+
+    def forces(
+        self, place: Array, velocity: Faces, k: Array, target: Array, steady: Array,
+        overlaps: Overlaps, slopes: Array, lift: Array, order: NDArray[np.int64],
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """What the gas does to particles, (n, 3) [N], and the sums of its parts, (3, 3) [N].
+
+        See :func:`greybed.coupling._exchange.forces_of`.
+        """
+        out, sums = np.empty((len(place), 3)), np.empty((3, 3))
+        _exchange.forces_of(
+            k, target, steady, overlaps.first, overlaps.cell, overlaps.volume, slopes, lift, place,
+            order, *self._shape, *self._wide(velocity), out, sums,
+        )  # fmt: skip
+        return out, sums
+
+    def _wide(self, velocity: Faces) -> list[Array]:
+        """Smoothed faces with one layer more around them, flat."""
+        wide = []
+        for axis, field in enumerate(velocity):
+            out = np.empty([len(at) for at in self._from[axis]])
+            smooth = np.ascontiguousarray(self.smoother.faces(field, axis))
+            _exchange.surround(smooth, *self._from[axis], out)
+            wide.append(out.reshape(-1))
+        return wide
+
+    def _none(self) -> list[Array]:
+        return [np.zeros((*(len(at) for at in lists), 2)) for lists in self._from]
+
+    def _gathered(self, sums: list[Array]) -> tuple[list[Array], list[Array]]:
         one, two = [], []
         for axis, shape in enumerate(self.grid.face_shapes):
             a, b = np.zeros(shape), np.zeros(shape)
