@@ -67,12 +67,17 @@ def with_gas(
     speed: float = SPEED,
     budget: bool = False,
     below: int = 0,
+    finer: int = 1,
 ) -> GasParticles:
-    """The same with air from below, which enters so many layers of cells under the floor."""
+    """The same with air from below, which enters so many layers of cells under the floor.
+
+    ``finer`` divides the edges of the cells.
+    """
     slip = Wall(slip=True)
     sides = {"z-": Inflow(speed), "z+": Outlet(), "x-": slip, "x+": slip}
     deep = below * SIZE[2] / CELLS[2]
-    grid = Grid(cells=CELLS, lower=(0.0, 0.0, -deep), upper=(*SIZE[:2], SIZE[2] - deep))
+    nx, ny, nz = (finer * n for n in CELLS)
+    grid = Grid(cells=(nx, ny, nz), lower=(0.0, 0.0, -deep), upper=(*SIZE[:2], SIZE[2] - deep))
     gas = GasSolver(grid, sides, AIR, budget=budget)
     return GasParticles(gas, simulation, Settings(drag=drag))
 
@@ -102,6 +107,7 @@ def main() -> None:
     parser.add_argument("--time", type=float, default=2.1, help="of fluidisation [s]")
     parser.add_argument("--drag", default="bvk")
     parser.add_argument("--below", type=int, default=1, help="layers of cells under the floor")
+    parser.add_argument("--finer", type=int, default=1, help="divides the cells along each axis")
     parser.add_argument("--steps", type=int, help="of the particles in one of the gas")
     parser.add_argument("--threads", type=int)
     given = parser.parse_args()
@@ -109,7 +115,7 @@ def main() -> None:
     sim = particles(given.threads)
     sim.run(SETTLE)
     settled = heights(sim.centres)
-    both = with_gas(sim, given.drag, 0.01 * SPEED, below=given.below)
+    both = with_gas(sim, given.drag, 0.01 * SPEED, below=given.below, finer=given.finer)
     started, cpu = time.perf_counter(), time.process_time()
     rows, worst = [], 0.0
     while both.time < given.time:
@@ -117,7 +123,8 @@ def main() -> None:
         report = both.step(given.steps)
         worst = max(worst, report.defect)
         p = both.gas.pressure.mean(axis=(1, 2))
-        floor = p[given.below - 1] if given.below else 1.5 * p[0] - 0.5 * p[1]
+        n = given.below * given.finer
+        floor = p[n - 1] if n else 1.5 * p[0] - 0.5 * p[1]
         rows.append((both.time, *heights(sim.centres), floor, report.contact_steps))
     table = np.array(rows)
     columns = ("time [s]", *(f"{name} [m]" for name in HEIGHTS), "pressure_drop [Pa]",
@@ -158,12 +165,13 @@ def draw(table: np.ndarray, weight: float, sim: Simulation, both: GasParticles, 
     axes[0].axhline(1e3 * MEASURED, color="k", ls="--", lw=0.8, label="measured")
     axes[0].set(xlabel="time [s]", ylabel="height [mm]", ylim=(0, None))
     axes[0].legend(frameon=False)
-    axes[1].plot(table[:, 0], table[:, 3] / weight, lw=0.8)
+    axes[1].plot(table[:, 0], table[:, -2] / weight, lw=0.8)
     axes[1].axhline(1.0, color="k", ls="--", lw=0.8)
     axes[1].set(xlabel="time [s]", ylabel="pressure drop over the bed's weight [-]")
     low, high = (1e3 * end[2] for end in (both.gas.grid.lower, both.gas.grid.upper))
     box = (0.0, 1e3 * SIZE[0], low, high)
-    axes[2].imshow(both.void[:, 0], origin="lower", extent=box, cmap="Greys_r", vmin=0.3, vmax=1.0)
+    middle = both.void[:, both.void.shape[1] // 2]
+    axes[2].imshow(middle, origin="lower", extent=box, cmap="Greys_r", vmin=0.3, vmax=1.0)
     axes[2].plot(*(1e3 * sim.centres[:, (0, 2)]).T, ".", ms=0.8, color="#d1602b")
     axes[2].set(xlabel="x [mm]", ylabel="z [mm]", title=f"{both.time:.2f} s")
     figure.savefig(path, dpi=110)

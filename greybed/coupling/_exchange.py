@@ -186,7 +186,8 @@ def drag_both_ways(
             bad = p
         each = 3.0 * math.pi * viscosity * d * eps * force
         each = each / eps if over else each
-        fastest = max(fastest, each / motion[p, 6])
+        if each > fastest * motion[p, 6]:
+            fastest = each / motion[p, 6]
         void[p], reynolds[p], k[p] = eps, re, each
         steepness[p] = max(1.0 + (slope / force if force > 0.0 else 0.0), 0.5)
         gx, gy, gz = each * gx, each * gy, each * gz
@@ -202,10 +203,10 @@ def drag_both_ways(
 
 @njit(**_OPTIONS)
 def forces_of(
-    k, target, steady, first, cell, volume, slopes, lift, place, order, lower, spacing, cells,
-    periodic, u, v, w, out, sums,
+    k, target, steady, first, cell, volume, slopes, lift, place, lower, spacing, cells, periodic,
+    u, v, w, out, sums,
 ):  # fmt: skip
-    """Fill ``out`` (n, 3), in the order of the input, with all that the gas does to particles.
+    """Fill ``out`` (n, 3) with all that the gas does to particles.
 
     The force is k (what is read of ``u``, ``v`` and ``w`` - target) + steady - sum of volumes times
     slopes + lift r^3, ``steady`` of (n, 3) and ``slopes`` of (cells, 3), or none, (0, 3). ``sums``
@@ -248,13 +249,31 @@ def forces_of(
                 px, py = px - part * slopes[at, 0], py - part * slopes[at, 1]
                 pz = pz - part * slopes[at, 2]
             gx, gy, gz = gx + px, gy + py, gz + pz
-        cube, at = place[p, 3] ** 3, order[p]
-        out[at, 0] = x + px + lift[0] * cube
-        out[at, 1] = y + py + lift[1] * cube
-        out[at, 2] = z + pz + lift[2] * cube
+        cube = place[p, 3] ** 3
+        out[p, 0] = x + px + lift[0] * cube
+        out[p, 1] = y + py + lift[1] * cube
+        out[p, 2] = z + pz + lift[2] * cube
     for row, found in enumerate(((fx, fy, fz), (ax, ay, az), (gx, gy, gz))):
         for c in range(3):
             sums[row, c] = found[c]
+
+
+@njit(**_OPTIONS)
+def inside_and_rims(field, along, periodic):
+    """Sums of faces across an axis of the array, inside and at rims; a face counts once."""
+    inside, rims = 0.0, 0.0
+    last = field.shape[along] - 1
+    for k in range(field.shape[0]):
+        for j in range(field.shape[1]):
+            for i in range(field.shape[2]):
+                at = k if along == 0 else j if along == 1 else i
+                if at > 0 and at < last:
+                    inside += field[k, j, i]
+                elif not periodic:
+                    rims += field[k, j, i]
+                elif at == 0:  # the last one is the same
+                    inside += field[k, j, i]
+    return inside, rims
 
 
 @njit(**_OPTIONS)

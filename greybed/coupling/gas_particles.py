@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from greybed.core.errors import InputError
-from greybed.coupling import _drag, _exchange
+from greybed.coupling import _drag, _exchange, _overlap
 from greybed.coupling.drag_exchange import DragTerms, Settings, drag_terms
 from greybed.coupling.exchange_report import ExchangeReport
 from greybed.coupling.forces import added_mass, shear_lift, vorticity_of
@@ -169,20 +169,15 @@ class GasParticles:
             if steady is not None:
                 loads, _ = self.transfer.give(place, -steady, np.zeros_like(steady))
         volume = gas.grid.cell_volume
-        none: Any = tuple(np.zeros(s) for s in gas.grid.face_shapes)
+        faces = self.transfer.faces
+        drag = aim = np.zeros_like(total)
         if self.settings.treatment == "explicit":
-            push = [-(b * u - a) for b, u, a in zip(total, gas.velocity, aimed, strict=True)]
-            source: Any = [
-                f if loads is None else f + w for f, w in zip(push, loads or push, strict=True)
-            ]
-            drag = aim = none
+            source = aimed - total * self.transfer.flat(gas.velocity)
+            source = source if loads is None else source + loads
         else:
-            source = none if loads is None else loads
-            drag = tuple(b / volume for b in total)
-            aim = tuple(
-                np.divide(a, b, out=np.zeros_like(a), where=b > 0.0)
-                for a, b in zip(aimed, total, strict=True)
-            )
+            source = drag if loads is None else loads
+            drag = total / volume
+            aim = np.divide(aimed, total, out=np.zeros_like(total), where=total > 0.0)
         at, order, warm = gas.velocity, sim._lists.ident, {}
         if self.heat is not None:
             d = 2.0 * place[:, 3]
@@ -190,8 +185,8 @@ class GasParticles:
                 overlaps, self.smoother, terms.void, terms.reynolds, d, order, dt
             )
         report = self.gas_report = gas.step(
-            dt, void_fraction=self.void, void_rate=rate, drag=drag, target=aim,
-            source=tuple(f / volume for f in source), **warm,
+            dt, void_fraction=self.void, void_rate=rate, drag=faces(drag), target=faces(aim),
+            source=faces(source / volume), **warm,
         )  # fmt: skip
         if self.heat is not None:
             self.heat.take(overlaps, self.smoother, report.heat, order, dt, sim)
@@ -201,18 +196,20 @@ class GasParticles:
         slopes = self._slopes().reshape(-1, 3) if by_gas else _NOTHING
         pushed, sums = self.transfer.forces(
             place, at, k, target, _NOTHING if steady is None else steady, overlaps, slopes,
-            self._lift(), order,
+            self._lift(),
         )  # fmt: skip
+        if not np.isfinite(sums).all():
+            raise InputError("the gas's forces on particles are not finite; take shorter steps.")
         given, parts, by_pressure = dt * sums
-        lost = [dt * (b * u - a) for b, u, a in zip(total, at, aimed, strict=True)]
-        taken, rims = self.transfer.split(lost)
+        largest = float(terms.reynolds.max(initial=0.0))
+        taken, rims = self.transfer.split(dt * (total * self.transfer.flat(at) - aimed))
         if steady is not None:
             given += dt * steady.sum(axis=0)
-            inside, outside = self.transfer.split([-f for f in loads])
+            inside, outside = self.transfer.split(-loads)
             taken, rims = taken + dt * inside, rims + dt * outside
         if self.settings.lubrication > 0.0:
-            pushed[order] += self._films(dt)[0]
-        sim.push(pushed)
+            pushed += self._films(dt)[0]
+        sim._push_in_place(pushed)
         sim.run(count)
         if self.heat is not None:
             self.heat.close()
@@ -223,7 +220,7 @@ class GasParticles:
         return ExchangeReport(
             self.time, dt, count, given, taken, rims, by_pressure,
             float(np.abs(given - taken - rims).max()) / scale, least, limited, terms.outside,
-            float(terms.reynolds.max(initial=0.0)),
+            largest,
         )  # fmt: skip
 
     # -- parts of a step --------------------------------------------------------------------
@@ -232,10 +229,14 @@ class GasParticles:
         return Overlaps(self.gas.grid, self.simulation._state.place, method=self.settings.void)
 
     def _void_of(self, overlaps: Overlaps) -> tuple[Array, float, int]:
-        void = 1.0 - self.smoother.cells(overlaps.solids()) / self.gas.grid.cell_volume
-        limit = self.settings.least_void
-        low = void < limit
-        return np.maximum(void, limit), float(void.min()), int(low.sum())
+        solids = overlaps.solids()
+        solids = solids if self.smoother.idle else self.smoother.cells(solids)
+        void = np.empty(solids.shape)
+        least, low = _overlap.void_of(
+            solids.reshape(-1), self.gas.grid.cell_volume, self.settings.least_void,
+            void.reshape(-1),
+        )  # fmt: skip
+        return void, least, low
 
     def _read(self, velocity: Faces) -> Array:
         return self.transfer.read(velocity, self.simulation._state.place)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,11 +35,25 @@ class Transfer:
             np.array(grid.periodic),
         )  # fmt: skip
 
+        # Faces across x, y and z lie one after the other in one array, which numpy takes at once.
+        self._ends = np.cumsum([0, *(math.prod(shape) for shape in grid.face_shapes)])
         # Where the values of arrays with one layer more come from, along z, y and x.
         self._from = [
             [_beyond(grid.cells[a], grid.periodic[a], a == axis) for a in (2, 1, 0)]
             for axis in range(3)
         ]
+
+    def faces(self, flat: Array) -> Faces:
+        """Views of values of all faces as faces across x, y and z."""
+        u, v, w = (
+            flat[self._ends[axis] : self._ends[axis + 1]].reshape(shape)
+            for axis, shape in enumerate(self.grid.face_shapes)
+        )
+        return u, v, w
+
+    def flat(self, faces: Faces) -> Array:
+        """A copy of values of faces in one array."""
+        return np.concatenate([field.reshape(-1) for field in faces])
 
     def read(self, velocity: Faces, place: Array) -> Array:
         """Values of faces at particles (n, 4), (n, 3)."""
@@ -45,8 +61,11 @@ class Transfer:
         _exchange.read_faces(place, *self._shape, *self._wide(velocity), out)
         return out
 
-    def give(self, place: Array, k: Array, target: Array) -> tuple[list[Array], list[Array]]:
-        """Sums of k (n, 3), or (n, 1), and of k target (n, 3) on faces: the transpose of read."""
+    def give(self, place: Array, k: Array, target: Array) -> tuple[Array, Array]:
+        """Sums of k (n, 3), or (n, 1), and of k target (n, 3) on faces: the transpose of read.
+
+        Both are flat, as of :meth:`flat`.
+        """
         sums = self._none()
         _exchange.give_to_faces(place, *self._shape, k, target, *(a.reshape(-1) for a in sums))
         return self._gathered(sums)
@@ -54,11 +73,11 @@ class Transfer:
     def drag(
         self, place: Array, motion: Array, overlaps: Overlaps, void: Array, velocity: Faces,
         law: DragLaw, fluid: Fluid, over: bool,
-    ) -> tuple[DragTerms, float, list[Array], list[Array]]:  # fmt: skip
+    ) -> tuple[DragTerms, float, Array, Array]:  # fmt: skip
         """Drag of a law, if ``over`` over the void fraction, and what is given of it.
 
         The second is the fastest relaxation of a particle [1/s]; the others are the sums of k and
-        of k times the particles' velocities on faces.
+        of k times the particles' velocities on faces, flat.
         """
         sums = self._none()
         at, re, k, steep = np.empty((4, len(place)))
@@ -75,7 +94,7 @@ class Transfer:
 
     def forces(
         self, place: Array, velocity: Faces, k: Array, target: Array, steady: Array,
-        overlaps: Overlaps, slopes: Array, lift: Array, order: NDArray[np.int64],
+        overlaps: Overlaps, slopes: Array, lift: Array,
     ) -> tuple[Array, Array]:  # fmt: skip
         """What the gas does to particles, (n, 3) [N], and the sums of its parts, (3, 3) [N].
 
@@ -84,7 +103,7 @@ class Transfer:
         out, sums = np.empty((len(place), 3)), np.empty((3, 3))
         _exchange.forces_of(
             k, target, steady, overlaps.first, overlaps.cell, overlaps.volume, slopes, lift, place,
-            order, *self._shape, *self._wide(velocity), out, sums,
+            *self._shape, *self._wide(velocity), out, sums,
         )  # fmt: skip
         return out, sums
 
@@ -93,7 +112,8 @@ class Transfer:
         wide = []
         for axis, field in enumerate(velocity):
             out = np.empty([len(at) for at in self._from[axis]])
-            smooth = np.ascontiguousarray(self.smoother.faces(field, axis))
+            smooth = field if self.smoother.idle else self.smoother.faces(field, axis)
+            smooth = np.ascontiguousarray(smooth)
             _exchange.surround(smooth, *self._from[axis], out)
             wide.append(out.reshape(-1))
         return wide
@@ -101,27 +121,26 @@ class Transfer:
     def _none(self) -> list[Array]:
         return [np.zeros((*(len(at) for at in lists), 2)) for lists in self._from]
 
-    def _gathered(self, sums: list[Array]) -> tuple[list[Array], list[Array]]:
-        one, two = [], []
-        for axis, shape in enumerate(self.grid.face_shapes):
-            a, b = np.zeros(shape), np.zeros(shape)
+    def _gathered(self, sums: list[Array]) -> tuple[Array, Array]:
+        one, two = np.zeros((2, self._ends[-1]))
+        both = zip(self.faces(one), self.faces(two), strict=True)
+        for axis, (a, b) in enumerate(both):
             _exchange.gather(sums[axis], *self._from[axis], a, b)
-            if self.grid.periodic[axis]:  # the last face is the first one
-                for ends in (np.moveaxis(a, 2 - axis, 0), np.moveaxis(b, 2 - axis, 0)):
+            for field in (a, b):
+                if self.grid.periodic[axis]:  # the last face is the first one
+                    ends = np.moveaxis(field, 2 - axis, 0)
                     ends[-1] = ends[0]
-            one.append(self.smoother.faces(a, axis))
-            two.append(self.smoother.faces(b, axis))
+                if not self.smoother.idle:
+                    field[...] = self.smoother.faces(field, axis)
         return one, two
 
-    def split(self, faces: list[Array]) -> tuple[Array, Array]:
+    def split(self, flat: Array) -> tuple[Array, Array]:
         """Sums of face values inside, and at rims, (3,) each; faces that repeat count once."""
-        inside, rims = np.empty(3), np.zeros(3)
-        for axis, field in enumerate(faces):
-            sums = field.sum(axis=tuple(a for a in range(3) if a != 2 - axis))
-            if self.grid.periodic[axis]:
-                inside[axis] = sums[:-1].sum()
-            else:
-                inside[axis], rims[axis] = sums[1:-1].sum(), sums[0] + sums[-1]
+        sums = [
+            _exchange.inside_and_rims(field, 2 - axis, self.grid.periodic[axis])
+            for axis, field in enumerate(self.faces(flat))
+        ]
+        inside, rims = np.array(sums).T
         return inside, rims
 
 
