@@ -259,6 +259,14 @@ def forces_of(
 
 
 @njit(**_OPTIONS)
+def shares(total, aimed, volume, drag, aim):
+    """Fill ``drag`` with ``total`` over the volume and ``aim`` with ``aimed`` over ``total``."""
+    for i in range(total.size):
+        drag[i] = total[i] / volume
+        aim[i] = aimed[i] / total[i] if total[i] > 0.0 else 0.0
+
+
+@njit(**_OPTIONS)
 def inside_and_rims(field, along, periodic):
     """Sums of faces across an axis of the array, inside and at rims; a face counts once."""
     inside, rims = 0.0, 0.0

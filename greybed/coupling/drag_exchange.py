@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NoReturn
 
 import numpy as np
@@ -108,7 +109,7 @@ class Settings:
         """The drag law itself."""
         return drag_law(self.drag) if isinstance(self.drag, str) else self.drag
 
-    @property
+    @cached_property
     def plain(self) -> DragLaw | None:
         """The law where the force is nothing but its k times the slip, given in one pass."""
         law = self.law

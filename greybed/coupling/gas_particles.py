@@ -170,14 +170,16 @@ class GasParticles:
                 loads, _ = self.transfer.give(place, -steady, np.zeros_like(steady))
         volume = gas.grid.cell_volume
         faces = self.transfer.faces
-        drag = aim = np.zeros_like(total)
+        none = np.zeros_like(total)
         if self.settings.treatment == "explicit":
+            drag = aim = none
             source = aimed - total * self.transfer.flat(gas.velocity)
             source = source if loads is None else source + loads
+            source = source / volume
         else:
-            source = drag if loads is None else loads
-            drag = total / volume
-            aim = np.divide(aimed, total, out=np.zeros_like(total), where=total > 0.0)
+            drag, aim = np.empty((2, len(total)))
+            _exchange.shares(total, aimed, volume, drag, aim)
+            source = none if loads is None else loads / volume
         at, order, warm = gas.velocity, sim._lists.ident, {}
         if self.heat is not None:
             d = 2.0 * place[:, 3]
@@ -186,7 +188,7 @@ class GasParticles:
             )
         report = self.gas_report = gas.step(
             dt, void_fraction=self.void, void_rate=rate, drag=faces(drag), target=faces(aim),
-            source=faces(source / volume), **warm,
+            source=faces(source), **warm,
         )  # fmt: skip
         if self.heat is not None:
             self.heat.take(overlaps, self.smoother, report.heat, order, dt, sim)
