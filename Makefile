@@ -1,10 +1,10 @@
-# The project's commands: quickstart, test, docs, verification, bench; each makes .venv first.
+# The project's commands: quickstart, test, coverage, docs, verification, bench; each makes .venv first.
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: quickstart test lint docs verification bench hooks clean help
+.PHONY: quickstart test coverage nojit lint docs verification bench hooks clean help
 help:            ## list the commands
 	@grep -E '^[a-z]+: .*##' $(MAKEFILE_LIST) | sed 's/:.*##/ -/'
 
@@ -22,6 +22,23 @@ test: $(STAMP)   ## lint, types, import contracts, tests
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n 2 --dist worksteal --durations=10
+
+# Compiled lines cannot be seen: kernels are left out of the one, and are all there is of the other.
+KERNELS := greybed/*/_[a-z]*.py,greybed/*/*/_[a-z]*.py,greybed/*/*/*/_[a-z]*.py
+coverage: $(STAMP) ## branches that the tests reach outside kernels, at least 90 %
+	$(BIN)/coverage erase
+	OPENBLAS_NUM_THREADS=1 $(BIN)/coverage run -m pytest -n 2 --dist worksteal
+	$(BIN)/coverage combine --quiet
+	$(BIN)/coverage report --omit='$(KERNELS)' --fail-under=90
+
+TINY := tests/*/test_tiny_*.py \
+	'tests/raytrace/test_cuda.py::test_single_rays_give_the_same_counts[unbounded_random]'
+nojit: export COVERAGE_FILE := .coverage.nojit
+nojit: $(STAMP)  ## kernels as plain Python: small cases, and the lines of kernels that they reach
+	$(BIN)/coverage erase
+	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest $(TINY)
+	$(BIN)/coverage combine --quiet
+	$(BIN)/coverage report --include='$(KERNELS)' --fail-under=90
 
 lint: $(STAMP)   ## mend what can be mended, show the rest
 	$(BIN)/ruff check --fix .

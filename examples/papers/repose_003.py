@@ -3,7 +3,8 @@
     python examples/papers/repose_003.py [--seeds N]
 
 The paper's nine pairs of friction (0.5, 0.7, 0.9) and rolling friction (0.07, 0.14, 0.21), constant
-torque, linear in its direction. Reduced: a lifted cylinder of 400 grains, Hertz' law of 0.5 MPa.
+torque, linear in its direction. Reduced: a lifted cylinder of 400 grains, Hertz' law of 0.5 MPa;
+the first and the last pair with 3200 grains of 5 MPa too, for what the size of the heap does.
 """
 
 import argparse
@@ -15,6 +16,15 @@ from record import HERE, Record
 from greybed.calibration.experiments import LIBRARY
 
 FRICTION, ROLLING = (0.5, 0.7, 0.9), (0.07, 0.14, 0.21)
+LARGE = 3200
+
+
+def heap_of(count, **changes):
+    """A lifted cylinder of so many grains."""
+    return LIBRARY["lifting-cylinder"](
+        name="heap", count=count, wall_friction=0.7, wall_rolling_friction=0.14,
+        rolling_law="constant-torque", **{"time_step": 6e-5, **changes},
+    )  # fmt: skip
 
 
 def main():
@@ -25,12 +35,13 @@ def main():
     for seed in range(options.seeds):
         for friction in FRICTION:
             for rolling in ROLLING:
-                heap = LIBRARY["lifting-cylinder"](
-                    name="heap", count=400, wall_friction=0.7, wall_rolling_friction=0.14,
-                    rolling_law="constant-torque", time_step=6e-5,
-                )  # fmt: skip
                 values = {"friction": friction, "rolling_friction": rolling}
-                record.make(f"{friction} {rolling} seed {seed}", heap, values, seed)
+                record.make(f"{friction} {rolling} seed {seed}", heap_of(400), values, seed)
+    for friction, rolling in ((FRICTION[0], ROLLING[0]), (FRICTION[-1], ROLLING[-1])):
+        key = f"{LARGE} grains {friction} {rolling}"
+        values = {"friction": friction, "rolling_friction": rolling}
+        record.make(key, heap_of(LARGE, youngs_modulus=5e6, time_step=2e-5), values, 0)
+        print(key, record.runs[key])
     table = np.array([
         [[run["repose_angle"], run["height"]] for key, run in record.runs.items()
          if key.startswith(f"{friction} {rolling} ")]

@@ -5,14 +5,35 @@ processes that compile two sets of argument types at once then write the same fi
 leads every later process to machine code for other types: it computes nonsense or crashes. Names
 that are never used twice leave nothing to mix up; at worst an entry of the index is lost, and
 compiled once more.
+
+With ``NUMBA_DISABLE_JIT=1`` kernels are plain Python, for a debugger or to see which lines a test
+reaches.
 """
 
 import uuid
+from typing import Any
 
-from numba import njit, prange
+import numba
+import numpy as np
+from numba import config, prange
 from numba.core.caching import IndexDataCacheFile
 
 __all__ = ["njit", "prange"]
+
+
+def _plain(function: Any = None, **options: Any) -> Any:
+    """Leave a kernel as it is, but silent about what compiled code does not speak of.
+
+    Random streams wrap their integers around, and what an array holds may be divided by 0.
+    """
+    if function is None:
+        return _plain
+    kernel: Any = np.errstate(all="ignore")(function)
+    kernel.py_func = function
+    return kernel
+
+
+njit: Any = _plain if config.DISABLE_JIT else numba.njit
 
 
 def _unique_name(self: IndexDataCacheFile, number: int) -> str:

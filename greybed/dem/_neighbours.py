@@ -66,17 +66,17 @@ def wrap(place, low, edge, periodic):
 
 @njit(**_OPTIONS)
 def list_pairs(
-    place, body, cell, start, member, shape, periodic, edge, skin, first, partner, shift
+    begin, end, place, body, cell, start, member, shape, periodic, edge, skin, first, partner, shift
 ):  # fmt: skip
     """Pairs whose surfaces are nearer than ``skin``, each once, by the lower particle.
 
-    Spheres of one body, those with the same number of at least 0, are no pair.
-    Fills ``first`` (n + 1), ``partner`` and the image codes ``shift`` (13 is none). Returns their
-    number, or minus the number needed where the arrays are too short.
+    Of the lower particles ``begin`` to ``end - 1``. Spheres of one body, those with the same number
+    of at least 0, are no pair. Fills ``first[begin:end]``, which begins with 0, ``partner`` and the
+    image codes ``shift`` (13 is none). Returns their number, or minus the number needed where the
+    arrays are too short.
     """
-    n = place.shape[0]
     count = 0
-    for i in range(n):
+    for i in range(begin, end):
         first[i] = count
         c = cell[i]
         cz = c % shape[2]
@@ -125,16 +125,28 @@ def list_pairs(
                                 partner[count] = j
                                 shift[count] = (mx + 1) * 9 + (my + 1) * 3 + mz + 1
                             count += 1
-    first[n] = count
     return count if count <= partner.size else -count
 
 
 @njit(**_OPTIONS)
 def carry_over(
-    order, first, partner, old_first, old_partner, old_touch, old_history, touch, history
+    begin,
+    end,
+    order,
+    first,
+    partner,
+    old_first,
+    old_partner,
+    old_touch,
+    old_history,
+    touch,
+    history,
 ):
-    """Histories of the new pairs from the old ones; ``order[new] = old`` number of a particle."""
-    for i in range(order.size):
+    """Histories of the new pairs from the old ones; ``order[new] = old`` number of a particle.
+
+    Of the pairs that particles ``begin`` to ``end - 1`` own.
+    """
+    for i in range(begin, end):
         a = order[i]
         for k in range(first[i], first[i + 1]):
             touch[k] = 0

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from greybed.core.jit import njit, prange
+from greybed.core.jit import njit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
@@ -73,8 +73,11 @@ def _matrix(w, x, y, z):
 
 
 @njit(**_OPTIONS)
-def _kick_some(begin, end, rigid, state, near, push, edge, dt, finish, start):
-    """Half kicks of bodies, their way where a step starts, and then their spheres."""
+def kick_some(begin, end, rigid, state, near, push, edge, dt, finish, start):
+    """Half kicks of bodies, their way where a step starts, and then their spheres.
+
+    All bodies before the spheres: what waits in the loads is still there then.
+    """
     # Flat, and numbers instead of slices: each slice counts references.
     pose, swing, bulk = rigid.pose.reshape(-1), rigid.swing.reshape(-1), rigid.bulk.reshape(-1)
     offset, image, first, member = (
@@ -150,24 +153,6 @@ def _kick_some(begin, end, rigid, state, near, push, edge, dt, finish, start):
                 vz + wx * y - wy * x,
             )
             motion[m + 3], motion[m + 4], motion[m + 5] = wx, wy, wz
-
-
-@njit(parallel=True, **_OPTIONS)
-def _kick_parts(rigid, state, near, push, edge, dt, finish, start):
-    bodies, parts = rigid.first.size - 1, near.block.size - 1
-    for p in prange(parts):
-        begin, end = np.int64(p * bodies // parts), np.int64((p + 1) * bodies // parts)
-        _kick_some(begin, end, rigid, state, near, push, edge, dt, finish, start)
-
-
-@njit(**_OPTIONS)
-def kick_bodies(rigid, state, near, push, edge, dt, finish, start):
-    """Of all bodies, before the spheres: what waits in the loads is still there then."""
-    if near.block.size == 2:
-        last = np.int64(rigid.first.size - 1)
-        _kick_some(np.int64(0), last, rigid, state, near, push, edge, dt, finish, start)
-    else:
-        _kick_parts(rigid, state, near, push, edge, dt, finish, start)
 
 
 @njit(**_OPTIONS)

@@ -1,19 +1,39 @@
-"""Compiled time steps: velocity Verlet over blocks of particles, until a list has to be renewed."""
+"""Compiled time steps: velocity Verlet over blocks of particles, until a list has to be renewed.
+
+Threads share the blocks of each part of a step. One leads: it says which part comes next and waits
+until all its blocks are done. Whoever is free takes the next block, so a helper that comes late,
+or never, holds nobody up; sums have one order whoever does them.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from greybed.core.jit import njit, prange
+from greybed.core.jit import njit
 from greybed.dem._batch import empty_batch
 from greybed.dem._pairs import block_forces
-from greybed.dem._rigid import kick_bodies
+from greybed.dem._rigid import kick_some
+from greybed.dem._share import add, look, put, rest
 from greybed.dem._walls import move, wall_forces
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
+# What is asked for: steps, forces of the present places, the second half of the last step's kick.
+STEPS, FORCES, FINISH = 0, 1, 2
 # Why the steps ended.
-DONE, RENEW, LOST = 0, 1, 2
+DONE, RENEW, LOST, HELPED = 0, 1, 2, 3
+# Parts of a step.
+_BODIES, _KICKS, _PAIRS = 0, 1, 2
+# What threads share: which part and its next block, blocks done, and beside them, written while
+# nobody works, the part and how to do it. Each counter has a line of the cache of its own.
+TICKET, _READY, _PART, _ENDS, _STARTS, _LOOKS = 0, 8, 16, 17, 18, 19
+SHARED = 24
+# A ticket is the number of the part in its upper half, and the next block in the lower one.
+_UPPER = 32
+_LOWER = (1 << _UPPER) - 1
+NO_WORK, STOP = 1 << 31, -(1 << 62)
+# Looks at a counter before a thread that waits lets other programs run.
+_PATIENCE = 2000
 
 
 class State(NamedTuple):
@@ -137,35 +157,15 @@ def _kick_and_drift(begin, end, state, near, push, dt, finish, start, worst):
     worst[0], worst[1] = largest, who
 
 
-@njit(parallel=True, **_OPTIONS)
-def _kicks_of_blocks(state, near, push, dt, finish, start, worst):
-    block = near.block
-    for b in prange(block.size - 1):
-        _kick_and_drift(block[b], block[b + 1], state, near, push, dt, finish, start, worst[b])
-
-
 @njit(**_OPTIONS)
-def _kicks(state, near, rigid, push, edge, dt, finish, start, worst):
-    if rigid.first.size > 1:
-        kick_bodies(rigid, state, near, push, edge, dt, finish, start)
-    # To wake threads for a single block takes longer than its step.
-    if near.block.size == 2:
-        _kick_and_drift(
-            near.block[0], near.block[1], state, near, push, dt, finish, start, worst[0]
-        )
-    else:
-        _kicks_of_blocks(state, near, push, dt, finish, start, worst)
-
-
-@njit(**_OPTIONS)
-def _forces_of_block(b, state, near, surfaces, law, edge, periodic, dt, look, deepest):
+def _forces_of_block(b, state, near, surfaces, law, edge, periodic, dt, looks, deepest):
     begin, end = near.block[b], near.block[b + 1]
     work = empty_batch(law.table)
     block_forces(
         begin, end, state.place, state.motion, state.load, state.kind,
         near.first, near.owner, near.partner, near.shift, near.touch, near.history, near.slot,
         near.crossing, edge, periodic, law.row, law.table, dt,
-        law.normal, law.rolling, law.cohesion, law.limit, look, deepest, work,
+        law.normal, law.rolling, law.cohesion, law.limit, looks, deepest, work,
     )  # fmt: skip
     if surfaces.kinds.size:
         surfaces.force[b, :, :] = 0.0
@@ -178,56 +178,107 @@ def _forces_of_block(b, state, near, surfaces, law, edge, periodic, dt, look, de
         )  # fmt: skip
 
 
-@njit(parallel=True, **_OPTIONS)
-def _forces_of_blocks(state, near, surfaces, law, edge, periodic, dt, look, deepest):
-    for b in prange(near.block.size - 1):
-        _forces_of_block(
-            np.int64(b), state, near, surfaces, law, edge, periodic, dt, look, deepest[b]
-        )
-
-
-# Numbers with a type of their own, not literals: each literal would be compiled once more.
 @njit(**_OPTIONS)
-def forces(state, near, surfaces, law, edge, periodic, dt, look, deepest):
-    """Forces of the present places; those across blocks wait in ``near.crossing``."""
-    if near.block.size == 2:
-        _forces_of_block(
-            np.int64(0), state, near, surfaces, law, edge, periodic, dt, look, deepest[0]
-        )
-    else:
-        _forces_of_blocks(state, near, surfaces, law, edge, periodic, dt, look, deepest)
+def _share(
+    team, state, near, rigid, surfaces, law, edge, periodic, push, dt, worst, deepest
+):  # fmt: skip
+    """Blocks of the present part until none is left; returns the ticket that got none."""
+    blocks, bodies = near.block.size - 1, rigid.first.size - 1
+    while True:
+        ticket = add(team, TICKET, 1)
+        b = ticket & _LOWER
+        if ticket < 0 or b >= blocks:
+            return ticket
+        part = team[_PART]
+        if part == _PAIRS:
+            # From the last one on: what the kicks have come to last is still near.
+            b = blocks - 1 - b
+            _forces_of_block(
+                b, state, near, surfaces, law, edge, periodic, dt, team[_LOOKS] != 0, deepest[b]
+            )
+        elif part == _KICKS:
+            _kick_and_drift(
+                near.block[b], near.block[b + 1], state, near, push, dt, team[_ENDS],
+                team[_STARTS], worst[b],
+            )  # fmt: skip
+        else:
+            kick_some(
+                b * bodies // blocks, (b + 1) * bodies // blocks, rigid, state, near, push, edge,
+                dt, team[_ENDS], team[_STARTS],
+            )  # fmt: skip
+        add(team, _READY, 1)
 
 
 @njit(**_OPTIONS)
-def advance(
-    steps, state, near, rigid, surfaces, law, edge, periodic, push, dt, skin, wall_pace, wall_way,
-    pending, worst, deepest,
+def _furthest(worst):
+    """The largest square of a way, and whose; also where it is no number, and then for good."""
+    largest, who = 0.0, -1
+    for b in range(worst.shape[0]):
+        if not worst[b, 0] <= largest and largest == largest:
+            largest, who = worst[b, 0], np.int64(worst[b, 1])
+    return largest, who
+
+
+@njit(**_OPTIONS)
+def work(
+    order, steps, leads, team, state, near, rigid, surfaces, law, edge, periodic, push, dt, skin,
+    wall_pace, wall_way, pending, worst, deepest,
 ):  # fmt: skip
     """Up to ``steps`` steps; returns those done, why it ended, and the particle that was at fault.
 
     ``pending`` says that the loads are of the present places but not yet in the velocities: so it
-    is after a step, and where lists were renewed between the way and the forces.
+    is after a step, and where lists were renewed between the way and the forces. Forces across
+    blocks wait in ``near.crossing``. ``team`` (SHARED) begins with NO_WORK as its ticket; helpers
+    do not lead and return when the leader has put STOP there.
     """
-    blocks = near.block.size - 1
-    for step in range(steps):
-        _kicks(state, near, rigid, push, edge, dt, np.int64(pending), np.int64(1), worst)
-        pending = True
-        largest, who = 0.0, -1
-        for b in range(blocks):
-            # Also where it is no number, and then for good.
-            if not worst[b, 0] <= largest and largest == largest:
-                largest, who = worst[b, 0], np.int64(worst[b, 1])
-        moving = wall_pace > 0.0
-        if moving:
-            move(surfaces.kinds, surfaces.data, surfaces.wall, surfaces.motion, dt)
-            wall_way += wall_pace * dt
-        if not largest < np.inf:
-            return step, LOST, who, wall_way
-        if 2.0 * np.sqrt(largest) > skin - wall_way:
-            return step, RENEW, who, wall_way
-        last = step == steps - 1
-        forces(state, near, surfaces, law, edge, periodic, dt, last, deepest)
-    return steps, DONE, -1, wall_way
+    blocks, step, number = near.block.size - 1, 0, 0
+    first = _BODIES if rigid.first.size > 1 else _KICKS
+    part = _PAIRS if order == FORCES else first
+    if leads:
+        team[_STARTS] = order == STEPS
+        team[_ENDS] = pending
+        team[_LOOKS] = order == FORCES
+    while True:
+        if leads:
+            number += 1
+            team[_PART] = part
+            put(team, TICKET, number << _UPPER)
+        ticket = _share(
+            team, state, near, rigid, surfaces, law, edge, periodic, push, dt, worst, deepest
+        )
+        looks = 0
+        if not leads:
+            if ticket < 0:
+                return 0, HELPED, -1, wall_way
+            while look(team, TICKET) >> _UPPER == ticket >> _UPPER:
+                looks += 1
+                rest(looks > _PATIENCE)
+            continue
+        while look(team, _READY) < number * blocks:
+            looks += 1
+            rest(looks > _PATIENCE)
+        if part == _BODIES:
+            part = _KICKS
+        elif part == _KICKS:
+            if order == FINISH:
+                near.crossing[:, :] = 0.0
+                return 0, DONE, -1, wall_way
+            team[_ENDS] = 1
+            largest, who = _furthest(worst)
+            if wall_pace > 0.0:
+                move(surfaces.kinds, surfaces.data, surfaces.wall, surfaces.motion, dt)
+                wall_way += wall_pace * dt
+            if not largest < np.inf:
+                return step, LOST, who, wall_way
+            if 2.0 * np.sqrt(largest) > skin - wall_way:
+                return step, RENEW, who, wall_way
+            team[_LOOKS] = step == steps - 1
+            part = _PAIRS
+        else:
+            step += 1
+            if order == FORCES or step == steps:
+                return step, DONE, -1, wall_way
+            part = first
 
 
 @njit(**_OPTIONS)
@@ -249,11 +300,4 @@ def gather(state, near):
         for m in range(near.into[i], near.into[i + 1]):
             for c in range(6):
                 state.load[i, c] += near.crossing[near.slots[m], c]
-    near.crossing[:, :] = 0.0
-
-
-@njit(**_OPTIONS)
-def finish(state, near, rigid, push, edge, dt, worst):
-    """The second half of the last step's kick."""
-    _kicks(state, near, rigid, push, edge, dt, np.int64(1), np.int64(0), worst)
     near.crossing[:, :] = 0.0

@@ -13,6 +13,7 @@ from greybed.core.errors import InputError
 from greybed.core.processors import available_threads
 from greybed.dem import _cohesion, _columns, _step
 from greybed.dem.bodies import Clumps, bodies_of, joined_states
+from greybed.dem.crew import run_steps
 from greybed.dem.laws import COHESION, NORMAL, ROLLING, ContactLaw
 from greybed.dem.lists import Lists
 from greybed.dem.materials import Contact, Material, pair_tables
@@ -152,6 +153,7 @@ class Simulation(Population):
         self.threads = min(available_threads(), most) if threads is None else int(threads)
         if not 1 <= self.threads <= most:
             raise InputError(f"threads = {self.threads} must lie in 1 ... {most}.")
+        self._lists.threads = self.threads
         self.steps = 0
         self.labels = np.arange(n)
         self._next = n
@@ -178,25 +180,12 @@ class Simulation(Population):
         left = int(steps)
         if left < 0:
             raise InputError(f"steps = {steps} must be at least 0.")
-        before = numba.get_num_threads()
-        numba.set_num_threads(self.threads)
-        try:
-            self._run(left)
-        finally:
-            numba.set_num_threads(before)
-
-    def _run(self, left: int) -> None:
         lists = self._lists
         while left:
             # At steps that a run in two parts meets, too: when lists are made decides the order of
             # the sums.
             before_look = LOOK - self.steps % LOOK
-            done, why, who, lists.wall_way = _step.advance(
-                min(left, before_look), self._state, lists.near, lists.rigid, lists.surfaces,
-                self._law, lists.edge, lists.wraps, self.gravity, self.time_step,
-                lists.skin - lists.reach, lists.wall_pace, lists.wall_way, self._pending,
-                lists.worst, lists.deepest,
-            )  # fmt: skip
+            done, why, who, lists.wall_way = self._work(_step.STEPS, min(left, before_look))
             self.steps += done
             left -= done
             self._pending = self._pending or done > 0
@@ -216,10 +205,7 @@ class Simulation(Population):
             elif done == before_look:
                 self._thin_skin()
         if self._pending:
-            _step.finish(
-                self._state, lists.near, lists.rigid, self.gravity, lists.edge, self.time_step,
-                lists.worst,
-            )  # fmt: skip
+            self._work(_step.FINISH, 1)
             self._pending = False
         self._check_overlaps()
 
@@ -317,13 +303,21 @@ class Simulation(Population):
             )
         return float(time_step)
 
+    def _work(
+        self, order: int, steps: int, time_step: float | None = None
+    ) -> tuple[int, int, int, float]:
+        lists = self._lists
+        return run_steps(
+            self.threads, order, steps, self._state, lists.near, lists.rigid, lists.surfaces,
+            self._law, lists.edge, lists.wraps, self.gravity,
+            self.time_step if time_step is None else time_step,
+            lists.skin - lists.reach, lists.wall_pace, lists.wall_way, self._pending,
+            lists.worst, lists.deepest,
+        )  # fmt: skip
+
     def _forces(self, passed: float) -> None:
         """Forces; springs stretch by what has moved in the time that has passed [s]."""
-        lists = self._lists
-        _step.forces(
-            self._state, lists.near, lists.surfaces, self._law, lists.edge, lists.wraps,
-            passed, True, lists.deepest,
-        )  # fmt: skip
+        self._work(_step.FORCES, 1, passed)
 
     def _gather(self) -> None:
         _step.gather(self._state, self._lists.near)

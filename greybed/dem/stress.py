@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from greybed.core.errors import InputError
 from greybed.dem import _step
+from greybed.dem.crew import run_steps
 from greybed.dem.simulation import Simulation
 
 Array = NDArray[np.float64]
@@ -43,9 +44,11 @@ def pair_forces(simulation: Simulation) -> tuple[NDArray[np.int64], Array, Array
     )  # fmt: skip
     state = lists.state._replace(load=np.zeros((n, 8)))
     none = lists.surfaces._replace(kinds=np.zeros(0, np.int64))
-    _step.forces(
-        state, alone, none, simulation._law, lists.edge, lists.wraps, 0.0, False, np.zeros((n, 2))
-    )
+    rows = np.zeros((n, 2))
+    run_steps(
+        1, _step.FORCES, 1, state, alone, lists.rigid, none, simulation._law, lists.edge,
+        lists.wraps, simulation.gravity, 0.0, lists.skin - lists.reach, 0.0, 0.0, False, rows, rows,
+    )  # fmt: skip
     acts = alone.crossing[:, :3].any(axis=1)
     low = near.owner[:m][acts]
     high = near.partner[:m][acts]

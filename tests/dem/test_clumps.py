@@ -244,9 +244,12 @@ def test_bed_of_bodies_settles_in_a_periodic_box_and_stays_rigid():
 
 
 def test_same_bits_on_two_threads_in_parts_and_from_a_checkpoint(tmp_path, monkeypatch):
-    from greybed.dem import lists
+    from greybed.dem import crew, lists
 
+    # So few spheres are one block, and call nobody to help.
     monkeypatch.setattr(lists, "BLOCK", 64)
+    monkeypatch.setattr(crew, "WORTH_HELP", 0)
+    monkeypatch.setattr(crew, "WORTH_PARTS", 0)
     whole, parts, two = bed(), bed(), bed(threads=2)
     whole.run(2000)
     two.run(2000)
