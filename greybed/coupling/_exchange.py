@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from greybed.closures.drag._kernels import drag
 from greybed.core.jit import njit
 
 _OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
@@ -135,39 +136,152 @@ def give_to_faces(place, lower, spacing, cells, periodic, k, target, u, v, w):
 
 
 @njit(**_OPTIONS)
-def forces_of(
-    k, seen, target, steady, first, cell, volume, slopes, lift, place, order, out, sums
+def drag_both_ways(
+    place, motion, first, cell, volume, void_fraction, code, least_solids, most_solids,
+    most_reynolds, density, viscosity, over, lower, spacing, cells, periodic, u, v, w, su, sv, sw,
+    void, reynolds, k, steepness,
 ):  # fmt: skip
-    """Fill ``out`` (n, 3), in the order of the input, with all that the gas does to particles.
+    """Drag of a law in one pass: what is read, and what is given with the particles' velocity.
 
-    The force is k (seen - target) + steady - sum of volumes times slopes + lift r^3, ``steady`` of
-    (n, 3) and ``slopes`` of (cells, 3), or none, (0, 3). ``sums`` (3, 3) gets the sums of the
-    first part, of its absolutes, and of the third.
+    ``u``, ``v`` and ``w`` as of :func:`read_faces`, ``su``, ``sv`` and ``sw`` as ``u``, ``v`` and
+    ``w`` of :func:`give_to_faces`, with the velocities of ``motion`` as targets. Fills the void
+    fraction at the particles, Re, drag over slip [N s/m], if ``over`` over the void fraction, and
+    the slope of drag over that, (n,) each. Returns how many lie outside the range of the law, the
+    first particle whose F is no number from 0 on, or -1, and the fastest relaxation [1/s].
+    """
+    ox, oy, oz = 1.0 / spacing[0], 1.0 / spacing[1], 1.0 / spacing[2]
+    nx, ny, nz = cells[0], cells[1], cells[2]
+    px, py, pz = periodic[0], periodic[1], periodic[2]
+    ru, rv, rw = nx + 3, nx + 2, nx + 2
+    uu, uv, uw = ru * (ny + 2), rv * (ny + 3), rw * (ny + 2)
+    outside, bad, fastest = 0, -1, 0.0
+    for p in range(place.shape[0]):
+        x = _in_turns((place[p, 0] - lower[0]) * ox, nx, px)
+        y = _in_turns((place[p, 1] - lower[1]) * oy, ny, py)
+        z = _in_turns((place[p, 2] - lower[2]) * oz, nz, pz)
+        (fi, fa), (fj, fb), (fk, fc) = _below(x), _below(y), _below(z)
+        i, a = _below(x - 0.5) if nx > 1 else (1, 0.0)
+        j, b = _below(y - 0.5) if ny > 1 else (1, 0.0)
+        m, c = _below(z - 0.5) if nz > 1 else (1, 0.0)
+        au, av, aw = m * uu + j * ru + fi, m * uv + fj * rv + i, fk * uw + j * rw + i
+        x = _pair(u, au, uu, fa, c)
+        y = _pair(v, av, uv, a, c) * (1.0 - fb) + _pair(v, av + rv, uv, a, c) * fb
+        z = _pair(w, aw, uw, a, fc)
+        if b != 0.0:  # it is 0 where all is in one row
+            x = x * (1.0 - b) + _pair(u, au + ru, uu, fa, c) * b
+            z = z * (1.0 - b) + _pair(w, aw + rw, uw, a, fc) * b
+        gx, gy, gz = motion[p, 0], motion[p, 1], motion[p, 2]
+        x, y, z = x - gx, y - gy, z - gz
+        total, whole = 0.0, 0.0
+        for n in range(first[p], first[p + 1]):
+            total += volume[n] * void_fraction[cell[n]]
+            whole += volume[n]
+        eps, d = total / whole, 2.0 * place[p, 3]
+        phi = 1.0 - eps
+        re = eps * density * d * math.sqrt(x**2 + y**2 + z**2) / viscosity
+        force, slope = drag(code, phi, re)
+        if not (phi >= least_solids and phi <= most_solids and re <= most_reynolds):
+            outside += 1
+        if bad < 0 and not (force >= 0.0 and force < np.inf):
+            bad = p
+        each = 3.0 * math.pi * viscosity * d * eps * force
+        each = each / eps if over else each
+        if each > fastest * motion[p, 6]:
+            fastest = each / motion[p, 6]
+        void[p], reynolds[p], k[p] = eps, re, each
+        steepness[p] = max(1.0 + (slope / force if force > 0.0 else 0.0), 0.5)
+        gx, gy, gz = each * gx, each * gy, each * gz
+        _spread(su, au, uu, fa, c, 1.0 - b, each, gx)
+        _spread(sv, av, uv, a, c, 1.0 - fb, each, gy)
+        _spread(sw, aw, uw, a, fc, 1.0 - b, each, gz)
+        _spread(sv, av + rv, uv, a, c, fb, each, gy)
+        if b != 0.0:
+            _spread(su, au + ru, uu, fa, c, b, each, gx)
+            _spread(sw, aw + rw, uw, a, fc, b, each, gz)
+    return outside, bad, fastest
+
+
+@njit(**_OPTIONS)
+def forces_of(
+    k, target, steady, first, cell, volume, slopes, lift, place, lower, spacing, cells, periodic,
+    u, v, w, out, sums,
+):  # fmt: skip
+    """Fill ``out`` (n, 3) with all that the gas does to particles.
+
+    The force is k (what is read of ``u``, ``v`` and ``w`` - target) + steady - sum of volumes times
+    slopes + lift r^3, ``steady`` of (n, 3) and ``slopes`` of (cells, 3), or none, (0, 3). ``sums``
+    (3, 3) gets the sums of the first part, of its absolutes, and of the third.
     """
     own = 1 if k.shape[1] == 3 else 0
     further, pressure = steady.shape[0] > 0, slopes.shape[0] > 0
+    ox, oy, oz = 1.0 / spacing[0], 1.0 / spacing[1], 1.0 / spacing[2]
+    nx, ny, nz = cells[0], cells[1], cells[2]
+    wx, wy, wz = periodic[0], periodic[1], periodic[2]
+    ru, rv, rw = nx + 3, nx + 2, nx + 2
+    uu, uv, uw = ru * (ny + 2), rv * (ny + 3), rw * (ny + 2)
     fx = fy = fz = ax = ay = az = gx = gy = gz = 0.0
     for p in range(place.shape[0]):
-        x = k[p, 0] * (seen[p, 0] - target[p, 0])
-        y = k[p, own] * (seen[p, 1] - target[p, 1])
-        z = k[p, 2 * own] * (seen[p, 2] - target[p, 2])
+        x = _in_turns((place[p, 0] - lower[0]) * ox, nx, wx)
+        y = _in_turns((place[p, 1] - lower[1]) * oy, ny, wy)
+        z = _in_turns((place[p, 2] - lower[2]) * oz, nz, wz)
+        (fi, fa), (fj, fb), (fk, fc) = _below(x), _below(y), _below(z)
+        i, a = _below(x - 0.5) if nx > 1 else (1, 0.0)
+        j, b = _below(y - 0.5) if ny > 1 else (1, 0.0)
+        m, c = _below(z - 0.5) if nz > 1 else (1, 0.0)
+        au, av, aw = m * uu + j * ru + fi, m * uv + fj * rv + i, fk * uw + j * rw + i
+        x = _pair(u, au, uu, fa, c)
+        y = _pair(v, av, uv, a, c) * (1.0 - fb) + _pair(v, av + rv, uv, a, c) * fb
+        z = _pair(w, aw, uw, a, fc)
+        if b != 0.0:  # it is 0 where all is in one row
+            x = x * (1.0 - b) + _pair(u, au + ru, uu, fa, c) * b
+            z = z * (1.0 - b) + _pair(w, aw + rw, uw, a, fc) * b
+        x = k[p, 0] * (x - target[p, 0])
+        y = k[p, own] * (y - target[p, 1])
+        z = k[p, 2 * own] * (z - target[p, 2])
         fx, fy, fz = fx + x, fy + y, fz + z
         ax, ay, az = ax + abs(x), ay + abs(y), az + abs(z)
         if further:
             x, y, z = x + steady[p, 0], y + steady[p, 1], z + steady[p, 2]
         px = py = pz = 0.0
         if pressure:
-            for m in range(first[p], first[p + 1]):
-                v, at = volume[m], cell[m]
-                px, py, pz = px - v * slopes[at, 0], py - v * slopes[at, 1], pz - v * slopes[at, 2]
+            for n in range(first[p], first[p + 1]):
+                part, at = volume[n], cell[n]
+                px, py = px - part * slopes[at, 0], py - part * slopes[at, 1]
+                pz = pz - part * slopes[at, 2]
             gx, gy, gz = gx + px, gy + py, gz + pz
-        cube, at = place[p, 3] ** 3, order[p]
-        out[at, 0] = x + px + lift[0] * cube
-        out[at, 1] = y + py + lift[1] * cube
-        out[at, 2] = z + pz + lift[2] * cube
+        cube = place[p, 3] ** 3
+        out[p, 0] = x + px + lift[0] * cube
+        out[p, 1] = y + py + lift[1] * cube
+        out[p, 2] = z + pz + lift[2] * cube
     for row, found in enumerate(((fx, fy, fz), (ax, ay, az), (gx, gy, gz))):
         for c in range(3):
             sums[row, c] = found[c]
+
+
+@njit(**_OPTIONS)
+def shares(total, aimed, volume, drag, aim):
+    """Fill ``drag`` with ``total`` over the volume and ``aim`` with ``aimed`` over ``total``."""
+    for i in range(total.size):
+        drag[i] = total[i] / volume
+        aim[i] = aimed[i] / total[i] if total[i] > 0.0 else 0.0
+
+
+@njit(**_OPTIONS)
+def inside_and_rims(field, along, periodic):
+    """Sums of faces across an axis of the array, inside and at rims; a face counts once."""
+    inside, rims = 0.0, 0.0
+    last = field.shape[along] - 1
+    for k in range(field.shape[0]):
+        for j in range(field.shape[1]):
+            for i in range(field.shape[2]):
+                at = k if along == 0 else j if along == 1 else i
+                if at > 0 and at < last:
+                    inside += field[k, j, i]
+                elif not periodic:
+                    rims += field[k, j, i]
+                elif at == 0:  # the last one is the same
+                    inside += field[k, j, i]
+    return inside, rims
 
 
 @njit(**_OPTIONS)

@@ -126,24 +126,33 @@ def _cells_of_sphere(
     return at
 
 
+@njit(inline="always", **_OPTIONS)
+def _within(x, low, spacing, count, periodic):
+    return periodic or (x >= low and x - low <= count * spacing)
+
+
 @njit(**_OPTIONS)
-def survey(place, lower, spacing, cells, periodic):
-    """The first sphere whose centre is not in the grid, or -1, and the largest radius."""
-    largest = 0.0
-    for i in range(place.shape[0]):
-        largest = max(largest, place[i, 3])
-        for axis in range(3):
-            at = place[i, axis] - lower[axis]
-            if not (periodic[axis] or (at >= 0.0 and at <= cells[axis] * spacing[axis])):
-                return i, largest
-    return -1, largest
+def void_of(solids, volume, limit, void):
+    """Fill ``void`` from volumes of spheres, no less than ``limit``; the least, and how many are.
+
+    All arrays are flat.
+    """
+    least, low = np.inf, 0
+    for i in range(solids.size):
+        found = 1.0 - solids[i] / volume
+        least = min(least, found)
+        if found < limit:
+            low += 1
+        void[i] = max(found, limit)
+    return least, low
 
 
 @njit(**_OPTIONS)
 def overlaps(place, lower, spacing, cells, periodic, most, first, cell, volume, solids):
     """Rows of cells and volumes of each sphere, ``first`` (n + 1,); the number of entries.
 
-    Adds the volumes to ``solids`` (cells,).
+    Adds the volumes to ``solids`` (cells,). Where a centre is not in the grid it stops, and returns
+    -1 less the number of that sphere.
     """
     table = np.empty((most + 1, most + 1, most + 1))
     nx, ny, nz = cells[0], cells[1], cells[2]
@@ -153,6 +162,12 @@ def overlaps(place, lower, spacing, cells, periodic, most, first, cell, volume, 
     for i in range(place.shape[0]):
         first[i] = at
         x, y, z, r = place[i, 0], place[i, 1], place[i, 2], place[i, 3]
+        if not (
+            _within(x, lower[0], spacing[0], nx, px)
+            and _within(y, lower[1], spacing[1], ny, py)
+            and _within(z, lower[2], spacing[2], nz, pz)
+        ):
+            return -1 - i
         x0, x1 = _planes(x - r, x + r, lower[0], ox, nx, px)
         y0, y1 = _planes(y - r, y + r, lower[1], oy, ny, py)
         z0, z1 = _planes(z - r, z + r, lower[2], oz, nz, pz)
@@ -193,6 +208,9 @@ def centre_cells(place, lower, spacing, cells, periodic, first, cell, volume, so
     nx, ny, nz = cells[0], cells[1], cells[2]
     over = 1.0 / spacing
     for i in range(place.shape[0]):
+        for axis in range(3):
+            if not _within(place[i, axis], lower[axis], spacing[axis], cells[axis], periodic[axis]):
+                return -1 - i
         x, _ = _planes(place[i, 0], place[i, 0], lower[0], over[0], nx, periodic[0])
         y, _ = _planes(place[i, 1], place[i, 1], lower[1], over[1], ny, periodic[1])
         z, _ = _planes(place[i, 2], place[i, 2], lower[2], over[2], nz, periodic[2])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NoReturn
 
 import numpy as np
@@ -108,6 +109,14 @@ class Settings:
         """The drag law itself."""
         return drag_law(self.drag) if isinstance(self.drag, str) else self.drag
 
+    @cached_property
+    def plain(self) -> DragLaw | None:
+        """The law where the force is nothing but its k times the slip, given in one pass."""
+        law = self.law
+        simple = self.mixture == self.lift == "none" and self.added_mass == 0.0
+        simple = simple and self.correction is None and self.treatment != "implicit"
+        return law if isinstance(law, DragLaw) and simple else None
+
 
 @dataclass(frozen=True, eq=False)
 class DragTerms:
@@ -158,7 +167,7 @@ def drag_terms(
             re, coefficient, steepness,
         )  # fmt: skip
         if bad >= 0:
-            _refuse(float(law(1.0 - void[bad], re[bad])), 1.0 - void[bad], re[bad])
+            refuse(float(law(1.0 - void[bad], re[bad])), 1.0 - void[bad], re[bad])
         outside = count / len(d)
     else:
         re, coefficient, steepness, outside = _general(settings, slip, void, d, density, viscosity)
@@ -178,7 +187,8 @@ def drag_terms(
     return DragTerms(coefficient, steepness, void, re, outside)
 
 
-def _refuse(force: float, phi: float, re: float) -> NoReturn:
+def refuse(force: float, phi: float, re: float) -> NoReturn:
+    """Tell what a drag law gives that no force can be."""
     raise InputError(
         f"the drag law gives F = {force:g} at a solid fraction of {phi:.3g} and Re = {re:.3g} [-]; "
         "F must be finite and at least 0: take another law."
@@ -209,7 +219,7 @@ def _general(
     good = np.isfinite(force) & (force >= 0.0)
     if not good.all():
         who = int((~good).argmax())
-        _refuse(force[who], phi[who], re[who])
+        refuse(force[who], phi[who], re[who])
     coefficient = 3.0 * math.pi * viscosity * d * void * force
     steepness = 1.0 + np.divide(slope, force, out=np.zeros_like(force), where=force > 0.0)
     return re, coefficient, np.maximum(steepness, 0.5), outside

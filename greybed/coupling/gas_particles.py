@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from greybed.core.errors import InputError
-from greybed.coupling import _drag, _exchange
+from greybed.coupling import _drag, _exchange, _overlap
 from greybed.coupling.drag_exchange import DragTerms, Settings, drag_terms
 from greybed.coupling.exchange_report import ExchangeReport
 from greybed.coupling.forces import added_mass, shear_lift, vorticity_of
@@ -151,62 +151,67 @@ class GasParticles:
         self.void, least, limited = self._void_of(overlaps)
         # What has moved since the last look took the time of the step before.
         rate = (self.void - before) / (self._passed or dt)
-        seen = self._read(gas.velocity)
-        terms = self._terms(overlaps, seen)
-        self._note(terms)
-        steady = self._steady(overlaps, terms, seen, dt)
-        k, target = self._linear(terms, seen, dt)
-        place = sim._state.place
-        total, aimed = self.transfer.give(place, k, target)
+        place, motion, law = sim._state.place, sim._state.motion, self.settings.plain
+        steady: Any = None
         loads: Any = None
-        if steady is not None:
-            loads, _ = self.transfer.give(place, -steady, np.zeros_like(steady))
-        volume = gas.grid.cell_volume
-        none: Any = tuple(np.zeros(s) for s in gas.grid.face_shapes)
-        if self.settings.treatment == "explicit":
-            push = [-(b * u - a) for b, u, a in zip(total, gas.velocity, aimed, strict=True)]
-            source: Any = [
-                f if loads is None else f + w for f, w in zip(push, loads or push, strict=True)
-            ]
-            drag = aim = none
-        else:
-            source = none if loads is None else loads
-            drag = tuple(b / volume for b in total)
-            aim = tuple(
-                np.divide(a, b, out=np.zeros_like(a), where=b > 0.0)
-                for a, b in zip(aimed, total, strict=True)
+        if law is not None and len(place):
+            terms, self._rate, total, aimed = self.transfer.drag(
+                place, motion, overlaps, self.void, gas.velocity, law, gas.fluid, gas.model == "B"
             )
+            k, target = terms.coefficient[:, None], motion
+        else:
+            seen = self._read(gas.velocity)
+            terms = self._terms(overlaps, seen)
+            self._note(terms)
+            steady = self._steady(overlaps, terms, seen, dt)
+            k, target = self._linear(terms, seen, dt)
+            total, aimed = self.transfer.give(place, k, target)
+            if steady is not None:
+                loads, _ = self.transfer.give(place, -steady, np.zeros_like(steady))
+        volume = gas.grid.cell_volume
+        faces = self.transfer.faces
+        none = np.zeros_like(total)
+        if self.settings.treatment == "explicit":
+            drag = aim = none
+            source = aimed - total * self.transfer.flat(gas.velocity)
+            source = source if loads is None else source + loads
+            source = source / volume
+        else:
+            drag, aim = np.empty((2, len(total)))
+            _exchange.shares(total, aimed, volume, drag, aim)
+            source = none if loads is None else loads / volume
         at, order, warm = gas.velocity, sim._lists.ident, {}
         if self.heat is not None:
-            d = 2.0 * sim._state.place[:, 3]
+            d = 2.0 * place[:, 3]
             warm = self.heat.offer(
                 overlaps, self.smoother, terms.void, terms.reynolds, d, order, dt
             )
         report = self.gas_report = gas.step(
-            dt, void_fraction=self.void, void_rate=rate, drag=drag, target=aim,
-            source=tuple(f / volume for f in source), **warm,
+            dt, void_fraction=self.void, void_rate=rate, drag=faces(drag), target=faces(aim),
+            source=faces(source), **warm,
         )  # fmt: skip
         if self.heat is not None:
             self.heat.take(overlaps, self.smoother, report.heat, order, dt, sim)
         if self.settings.treatment != "explicit":
             at = report.velocity
-        pushed, sums = np.empty((len(place), 3)), np.empty((3, 3))
         by_gas = self.settings.pressure and gas.model == "A"
         slopes = self._slopes().reshape(-1, 3) if by_gas else _NOTHING
-        _exchange.forces_of(
-            k, self._read(at), target, _NOTHING if steady is None else steady, overlaps.first,
-            overlaps.cell, overlaps.volume, slopes, self._lift(), place, order, pushed, sums,
+        pushed, sums = self.transfer.forces(
+            place, at, k, target, _NOTHING if steady is None else steady, overlaps, slopes,
+            self._lift(),
         )  # fmt: skip
+        if not np.isfinite(sums).all():
+            raise InputError("the gas's forces on particles are not finite; take shorter steps.")
         given, parts, by_pressure = dt * sums
-        lost = [dt * (b * u - a) for b, u, a in zip(total, at, aimed, strict=True)]
-        taken, rims = self.transfer.split(lost)
+        largest = float(terms.reynolds.max(initial=0.0))
+        taken, rims = self.transfer.split(dt * (total * self.transfer.flat(at) - aimed))
         if steady is not None:
             given += dt * steady.sum(axis=0)
-            inside, outside = self.transfer.split([-f for f in loads])
+            inside, outside = self.transfer.split(-loads)
             taken, rims = taken + dt * inside, rims + dt * outside
         if self.settings.lubrication > 0.0:
-            pushed[order] += self._films(dt)[0]
-        sim.push(pushed)
+            pushed += self._films(dt)[0]
+        sim._push_in_place(pushed)
         sim.run(count)
         if self.heat is not None:
             self.heat.close()
@@ -217,7 +222,7 @@ class GasParticles:
         return ExchangeReport(
             self.time, dt, count, given, taken, rims, by_pressure,
             float(np.abs(given - taken - rims).max()) / scale, least, limited, terms.outside,
-            float(terms.reynolds.max(initial=0.0)),
+            largest,
         )  # fmt: skip
 
     # -- parts of a step --------------------------------------------------------------------
@@ -226,10 +231,14 @@ class GasParticles:
         return Overlaps(self.gas.grid, self.simulation._state.place, method=self.settings.void)
 
     def _void_of(self, overlaps: Overlaps) -> tuple[Array, float, int]:
-        void = 1.0 - self.smoother.cells(overlaps.solids()) / self.gas.grid.cell_volume
-        limit = self.settings.least_void
-        low = void < limit
-        return np.maximum(void, limit), float(void.min()), int(low.sum())
+        solids = overlaps.solids()
+        solids = solids if self.smoother.idle else self.smoother.cells(solids)
+        void = np.empty(solids.shape)
+        least, low = _overlap.void_of(
+            solids.reshape(-1), self.gas.grid.cell_volume, self.settings.least_void,
+            void.reshape(-1),
+        )  # fmt: skip
+        return void, least, low
 
     def _read(self, velocity: Faces) -> Array:
         return self.transfer.read(velocity, self.simulation._state.place)

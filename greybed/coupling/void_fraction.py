@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,16 +53,10 @@ class Overlaps:
         n = len(place)
         shape = (np.array(grid.lower, dtype=np.float64), np.array(grid.spacing),
                  np.array(grid.cells), np.array(grid.periodic))  # fmt: skip
-        lost, largest = _overlap.survey(place, *shape)
-        if lost >= 0:
-            at = ", ".join(f"{c:.4g}" for c in place[lost, :3])
-            raise InputError(
-                f"a particle at ({at}) [m] lies outside the gas's grid, {grid.lower} to "
-                f"{grid.upper}; make the grid larger or keep the particles in with walls."
-            )
         self.grid = grid
         self.first = np.empty(n + 1, np.int64)
         # Cells that the largest sphere may reach along each axis.
+        largest = float(place[:, 3].max(initial=0.0))
         across = [int(2.0 * largest / h) + 2 for h in grid.spacing]
         most, entries = max(across), n if method == "centre" else n * math.prod(across)
         cell, volume = np.empty(entries, np.int64), np.empty(entries)
@@ -71,13 +66,17 @@ class Overlaps:
             used = _overlap.centre_cells(place, *shape, *found)
         else:
             used = _overlap.overlaps(place, *shape, most, *found)
+        if used < 0:
+            at = ", ".join(f"{c:.4g}" for c in place[-1 - used, :3])
+            raise InputError(
+                f"a particle at ({at}) [m] lies outside the gas's grid, {grid.lower} to "
+                f"{grid.upper}; make the grid larger or keep the particles in with walls."
+            )
         self.cell, self.volume = cell[:used], volume[:used]
-        self._radii = place[:, 3].copy()
 
-    @property
+    @cached_property
     def _whole(self) -> Array:
-        r = self._radii
-        whole: Array = 4.0 / 3.0 * np.pi * (r * r * r)  # numpy's powers are slow
+        whole: Array = np.add.reduceat(self.volume, self.first[:-1])
         return whole
 
     def solids(self) -> Array:
@@ -87,7 +86,7 @@ class Overlaps:
     def integral(self, fields: Array) -> Array:
         """Integrals over each sphere of fields (nz, ny, nx, k), constant in cells; (n, k) [m3]."""
         fields = np.ascontiguousarray(fields)
-        out = np.empty((len(self._radii), fields.shape[-1]))
+        out = np.empty((len(self.first) - 1, fields.shape[-1]))
         flat = fields.reshape(-1, fields.shape[-1])
         _overlap.collect(self.first, self.cell, self.volume, flat, out)
         return out

@@ -247,12 +247,18 @@ class Simulation(Population):
             shape = given[name].shape
             if values is not None and (shape != (n, 3) or not np.isfinite(given[name]).all()):
                 raise InputError(f"{name} of shape {shape} must be ({n}, 3), all finite.")
-        outer = np.empty((n, 6))
+        self._push(given["forces"], given["torques"], self._lists.ident)
+
+    def _push_in_place(self, forces: NDArray[np.float64]) -> None:
+        """The same with finite forces (n, 3) in the order of the particles' places."""
+        self._push(forces, np.zeros((0, 3)), np.arange(len(forces)))
+
+    def _push(
+        self, forces: NDArray[np.float64], torques: NDArray[np.float64], rows: NDArray[np.int64]
+    ) -> None:
+        outer = np.empty((len(rows), 6))
         # The next half kick is with the loads of now.
-        _step.push(
-            given["forces"], given["torques"], self._lists.ident, self._state.outer, outer,
-            self._state.load,
-        )  # fmt: skip
+        _step.push(forces, torques, rows, self._state.outer, outer, self._state.load)
         self._state = self._lists.state = self._state._replace(outer=outer)
 
     # -- inside -----------------------------------------------------------------------------
