@@ -47,7 +47,7 @@ def _alone(dispatcher: Dispatcher) -> Iterator[None]:
 
     Locks are taken in the order of calls, callers first, which has no circles.
     """
-    cache = dispatcher._cache
+    cache = dispatcher._cache  # type: ignore[attr-defined]
     folder = getattr(cache, "cache_path", None)
     if fcntl is None or folder is None:  # a kernel that is not kept
         yield
@@ -84,4 +84,4 @@ def _compile_once(self: Dispatcher, sig: Any) -> Any:
 # Numba offers no way of its own: its choice of a place (a locator) neither names the files nor
 # stands between the search for machine code and the compiler.
 IndexDataCacheFile._data_name = _unique_name
-Dispatcher.compile = _compile_once
+Dispatcher.compile = _compile_once  # type: ignore[method-assign]
