@@ -3,7 +3,7 @@
 Three models predict ``HELD_OUT.csv``: the study's as it is; the same with its parameters fitted to
 the study's table wherever that takes them, whatever was measured of them; the one that the
 diagnosis wrote. Errors are root mean squares of the log of predicted over measured; their 95 %
-intervals come from 4000 resamplings of the rows. Run:
+intervals come from 4000 resamplings of the rows. ``circle.png`` shows all held-out rows. Run:
 
     python circle.py settling/study_spheres.toml settling/spheres_held_out.csv --out runs/spheres
 """
@@ -12,8 +12,15 @@ import argparse
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import FuncFormatter
 from scipy.optimize import least_squares
 
 from greybed.residual import Diagnosis, Study, Table, diagnose, read_study
@@ -22,17 +29,20 @@ from greybed.residual.output import write_diagnosis
 from greybed.residual.table import read_table
 
 RESAMPLES = 4000
+MODELS = ("before", "recalibrated", "with_effect")
 
 
 @dataclass(frozen=True)
 class Circle:
-    """A diagnosis, and errors of held-out rows as (value, low, high)."""
+    """A diagnosis, errors of held-out rows as (value, low, high), and the rows themselves."""
 
     diagnosis: Diagnosis
     before: tuple[float, float, float]
     recalibrated: tuple[float, float, float]
     with_effect: tuple[float, float, float]
     parameters: dict[str, float]
+    measured: np.ndarray
+    predictions: dict[str, np.ndarray]
 
 
 def predicted(study: Study, table: Table, parameters: dict[str, float]) -> np.ndarray:
@@ -92,13 +102,36 @@ def circle(path: Path, held_out: Path, folder: Path) -> Circle:
     fitted = recalibrated(study)
     # measured parameters stay as measured, so that the effect has to carry the improvement alone
     with_effect = {name: item.value for name, item in after.parameters.items()}
+    logs = {
+        "before": predicted(study, table, stated),
+        "recalibrated": predicted(study, table, fitted),
+        "with_effect": predicted(after, table, with_effect),
+    }
     return Circle(
         diagnosis=found,
-        before=error(predicted(study, table, stated) - measured),
-        recalibrated=error(predicted(study, table, fitted) - measured),
-        with_effect=error(predicted(after, table, with_effect) - measured),
+        **{name: error(log - measured) for name, log in logs.items()},
         parameters=fitted,
+        measured=np.exp(measured),
+        predictions={name: np.exp(log) for name, log in logs.items()},
     )
+
+
+def draw(axes: Axes, record: dict[str, Any]) -> None:
+    """Predicted over measured of all held-out rows, by model; ``record`` is a ``circle.json``."""
+    measured = np.array(record["measured"])
+    for name, marker, colour in zip(MODELS, "sDo", ("C7", "C0", "C1"), strict=True):
+        ratio = np.array(record["predictions"][name]) / measured
+        label = f"{name.replace('_', ' ')}: {record[name][0]:.2g}"
+        axes.plot(
+            np.arange(1, len(ratio) + 1), ratio, marker, color=colour, label=label, mfc="none"
+        )
+    axes.axhline(1.0, color="0.5", lw=0.8)
+    axes.set_yscale("log")
+    for ticks in (axes.yaxis.set_major_formatter, axes.yaxis.set_minor_formatter):
+        ticks(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.set_xlabel("row of the held-out table")
+    axes.set_ylabel(f"{record['response']}, predicted / measured")
+    axes.legend(fontsize="small")
 
 
 if __name__ == "__main__":
@@ -109,9 +142,15 @@ if __name__ == "__main__":
     asked = parser.parse_args()
     made = circle(asked.study, asked.held_out, asked.out)
     print(made.diagnosis.sentence)
-    rows = {name: getattr(made, name) for name in ("before", "recalibrated", "with_effect")}
+    rows = {name: getattr(made, name) for name in MODELS}
     for name, (value, low, high) in rows.items():
         print(f"{name.replace('_', ' '):14} {value:.4f} ({low:.4f} to {high:.4f})")
-    (asked.out / "circle.json").write_text(
-        json.dumps({**rows, "verdict": made.diagnosis.verdict, "fitted": made.parameters}, indent=1)
-    )
+    record = {
+        **rows, "verdict": made.diagnosis.verdict, "fitted": made.parameters,
+        "response": read_study(asked.study).response, "measured": made.measured.tolist(),
+        "predictions": {name: values.tolist() for name, values in made.predictions.items()},
+    }  # fmt: skip
+    (asked.out / "circle.json").write_text(json.dumps(record, indent=1))
+    figure, axes = plt.subplots(figsize=(5.0, 3.6), layout="constrained")
+    draw(axes, record)
+    figure.savefig(asked.out / "circle.png", dpi=110)

@@ -21,6 +21,9 @@ from greybed.datasets.executors import Executor, Job
 
 Task = Callable[[dict[str, Any], Path], Mapping[str, Any]]
 RESULT = ".json"
+# Of the inputs: where files are, whose content is told beside it. Not of the key, so that a folder
+# may be moved.
+PLACE = "place"
 
 
 @dataclass(frozen=True)
@@ -51,9 +54,10 @@ class Campaign:
 
 
 def key_of(task: Task, inputs: Mapping[str, Any]) -> str:
-    """Hash of a task: the function's name, the version of greybed, the inputs."""
+    """Hash of a task: the function's name, the version of greybed, the inputs but ``place``."""
     name = f"{task.__module__}.{task.__qualname__}"
-    text = json.dumps([__version__, name, inputs], sort_keys=True)
+    known = {word: value for word, value in inputs.items() if word != PLACE}
+    text = json.dumps([__version__, name, known], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 

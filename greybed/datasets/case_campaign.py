@@ -7,8 +7,10 @@ import csv
 import itertools
 import json
 import os
+import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,7 @@ from greybed.core.config import read_toml
 from greybed.core.errors import InputError
 from greybed.core.files import atomic_path, sha256_of
 from greybed.core.processes import ending_with_parent
-from greybed.datasets.campaign import Campaign
+from greybed.datasets.campaign import PLACE, Campaign
 
 # More cases than this are a slip of the pen.
 MOST_CASES = 1_000_000
@@ -37,7 +39,8 @@ def cases_of(path: Path) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        ``case``, ``varied``, ``files`` (their hashes), ``words``: what decides the results.
+        ``case``, ``varied``, ``files`` (their hashes), ``words``: what decides the results; and
+        ``place``, the folder of the files, which does not.
 
     Raises
     ------
@@ -55,8 +58,7 @@ def cases_of(path: Path) -> list[dict[str, Any]]:
         )
     base = path.parent / name
     case = read_toml(base)
-    files: dict[str, str] = {}
-    case = _absolute(case, base.resolve().parent, files)
+    folder, hashes = base.resolve().parent, dict[Path, str]()
     places = list(vary)
     count = 1
     for place in places:
@@ -68,9 +70,19 @@ def cases_of(path: Path) -> list[dict[str, Any]]:
         one = copy.deepcopy(case)
         for place, value in zip(places, values, strict=True):
             _put(one, place, value, path)
-        varied = dict(zip(places, values, strict=True))
+        files: dict[str, str] = {}
+        for name, file in _files(one, folder):
+            if file not in hashes:
+                hashes[file] = sha256_of(file)
+            files[name] = hashes[file]
         found.append(
-            {"case": one, "varied": varied, "files": files, "words": [str(w) for w in words]}
+            {
+                "case": one,
+                "varied": dict(zip(places, values, strict=True)),
+                "files": files,
+                "words": [str(w) for w in words],
+                PLACE: str(folder),
+            }
         )
     return found
 
@@ -86,13 +98,17 @@ def simulate_case(inputs: dict[str, Any], folder: Path) -> dict[str, Any]:
     folder.mkdir(parents=True, exist_ok=True)
     case = folder / "case.toml"
     with atomic_path(case) as part:
-        part.write_bytes(tomli_w.dumps(inputs["case"]).encode())
+        there = _absolute(inputs["case"], Path(inputs[PLACE]))
+        part.write_bytes(tomli_w.dumps(there).encode())
     words = [sys.executable, "-m", "greybed", "simulate", str(case), "--out", str(folder)]
     done = subprocess.run(
         [*words, "--quiet", *inputs["words"]], capture_output=True, text=True, check=False,
         stdin=subprocess.DEVNULL, env={**os.environ, "NUMBA_NUM_THREADS": "1"},
         preexec_fn=ending_with_parent(),
     )  # fmt: skip
+    if done.returncode < 0:
+        name = signal.strsignal(-done.returncode) or f"signal {-done.returncode}"
+        raise RuntimeError(f"greybed simulate was ended from outside or crashed ({name})")
     if done.returncode != 0:
         said = (done.stderr.strip() or done.stdout.strip() or "it said nothing").splitlines()[-1]
         raise RuntimeError(f"greybed simulate ended with {done.returncode}: {said}")
@@ -119,16 +135,26 @@ def write_table(campaign: Campaign, inputs: list[dict[str, Any]], path: Path) ->
         writer.writerows(rows)
 
 
-def _absolute(value: Any, folder: Path, files: dict[str, str]) -> Any:
-    """The case with names of files beside it as whole paths; their hashes go into ``files``."""
+def _files(value: Any, folder: Path) -> Iterator[tuple[str, Path]]:
+    """Names in a case that are files below its folder, and the files."""
+    if isinstance(value, dict | list):
+        for part in value.values() if isinstance(value, dict) else value:
+            yield from _files(part, folder)
+    elif _is_file(value, folder):
+        yield value, folder / value
+
+
+def _absolute(value: Any, folder: Path) -> Any:
+    """The case with names of such files as whole paths."""
     if isinstance(value, dict):
-        return {name: _absolute(part, folder, files) for name, part in value.items()}
+        return {name: _absolute(part, folder) for name, part in value.items()}
     if isinstance(value, list):
-        return [_absolute(part, folder, files) for part in value]
-    if isinstance(value, str) and 0 < len(value) < 255 and (folder / value).is_file():
-        files[value] = sha256_of(folder / value)
-        return str(folder / value)
-    return value
+        return [_absolute(part, folder) for part in value]
+    return str(folder / value) if _is_file(value, folder) else value
+
+
+def _is_file(value: Any, folder: Path) -> bool:
+    return isinstance(value, str) and 0 < len(value) < 255 and (folder / value).is_file()
 
 
 def _put(case: Any, place: str, value: Any, path: Path) -> None:

@@ -1,6 +1,7 @@
 """Campaigns: nothing lost, nothing done twice, whoever is killed; the same on dask's workers."""
 
 import os
+import shutil
 import signal
 import threading
 import time
@@ -11,7 +12,8 @@ import pytest
 from greybed.cli.main import main
 from greybed.core.clusters import client_of, slurm_table
 from greybed.core.errors import InputError
-from greybed.datasets.campaign import run_campaign
+from greybed.datasets.campaign import key_of, run_campaign
+from greybed.datasets.case_campaign import cases_of, simulate_case
 from greybed.datasets.executors import Dask, OwnProcesses, executor_of
 
 
@@ -152,6 +154,32 @@ def test_cases_are_run_and_tabled(tmp_path, capsys):
     assert [row.split(",")[1] for row in rows] == ["0.5", "0.9"]
     assert main([*words, "--workers", "1"]) == 0
     assert "2 were done before, 0 done now" in capsys.readouterr().out
+    # A campaign that has moved, with its files, knows what it has done.
+    moved = shutil.copytree(tmp_path, tmp_path / "moved")
+    words = ["campaign", str(moved / "study.toml"), "--out", str(moved / "out"), "--quiet"]
+    assert main([*words, "--workers", "1"]) == 0
+    assert "2 were done before, 0 done now" in capsys.readouterr().out
+
+
+def test_files_that_are_varied_are_known_by_what_they_hold(tmp_path):
+    for name, z in (("start.csv", 5), ("high.csv", 7)):
+        (tmp_path / name).write_text(f"x [mm],y [mm],z [mm],radius [mm]\n0,0,{z},1\n")
+    (tmp_path / "case.toml").write_text(CASE)
+    study = tmp_path / "study.toml"
+    study.write_text('case = "case.toml"\n[vary]\n"particles.0.file" = ["start.csv", "high.csv"]\n')
+
+    def keys():
+        return [key_of(simulate_case, given) for given in cases_of(study)]
+
+    first = keys()
+    assert len(set(first)) == 2
+    (tmp_path / "high.csv").write_text("x [mm],y [mm],z [mm],radius [mm]\n0,0,8,1\n")
+    assert keys()[0] == first[0]
+    assert keys()[1] != first[1]
+    # The case that is run names the file where it is.
+    summary = simulate_case(cases_of(study)[1], tmp_path / "task")
+    assert summary["verb"] == "simulate"
+    assert str(tmp_path / "high.csv") in (tmp_path / "task" / "case.toml").read_text()
 
 
 CASE = """
