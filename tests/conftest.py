@@ -32,6 +32,16 @@ def once(tmp_path_factory: pytest.TempPathFactory, name: str, make: Callable[[Pa
     return folder
 
 
+@pytest.fixture(scope="session", autouse=True)
+def compiled_kernels():
+    """With several processes, the dearest kernels are compiled first, each by one of them."""
+    worker = os.environ.get("PYTEST_XDIST_WORKER", "")
+    if worker:
+        from tests.kernels import compile_share
+
+        compile_share(int(worker.removeprefix("gw")))
+
+
 @pytest.fixture(scope="session")
 def small_quickstart(tmp_path_factory):
     """What ``greybed quickstart --small --out out`` leaves in ``out``, and what it said."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -178,7 +179,7 @@ class Packing:
         *,
         source: str = "packing",
     ) -> None:
-        c = np.array(centres, dtype=np.float64, ndmin=2)
+        c = np.array(centres, dtype=np.float64, ndmin=2, order="C")
         if c.ndim != 2 or c.shape[1:] != (3,) or len(c) == 0:
             raise InputError(
                 f"{source}: centres have shape {c.shape}; give (n, 3) with n >= 1, in metres."
@@ -212,6 +213,13 @@ class Packing:
         object.__setattr__(self, "periodic", (p0, p1, p2))
         object.__setattr__(self, "walls", tuple(walls))
         object.__setattr__(self, "source", source)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        # Arrays of a copy come writable, and kernels would be compiled once more for that.
+        self.__dict__.update(state)
+        for array in (self.centres, self.radii, self.box):
+            if array is not None:
+                array.setflags(write=False)
 
     def __len__(self) -> int:
         return len(self.radii)

@@ -37,6 +37,30 @@ DIMENSIONS = {
     "dimensionless": ("", "percent, or no unit"),
 }
 
+# What is typed most, as pint would convert it to the last bit: loading pint takes a second.
+USUAL = {
+    "length": {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "cm": 1e-2},
+    "area": {"m2": 1.0, "mm2": 1e-6},
+    "volume": {"m3": 1.0, "mm3": 1e-9},
+    "time": {"ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
+    "mass": {"g": 1e-3},
+    "velocity": {"m s-1": 1.0, "mm/s": 1e-3, "cm/s": 1e-2},
+    "mass flow": {"g/s": 1e-3},
+    "stiffness": {"kN/m": 1e3},
+    "acceleration": {"m/s2": 1.0, "m s-2": 1.0},
+    "density": {"kg/m3": 1.0, "kg m-3": 1.0},
+    "force": {"mN": 1e-3},
+    "pressure": {"kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "bar": 1e5},
+    "viscosity": {"Pa s": 1.0, "mPa s": 1e-3},
+    "power": {"mW": 1e-3, "kW": 1e3},
+    "heat flux": {"W/m2": 1.0, "kW/m2": 1e3},
+    "conductivity": {"W m-1 K-1": 1.0},
+    "heat capacity": {"J kg-1 K-1": 1.0, "kJ/kg/K": 1e3},
+    "angle": {"deg": np.pi / 180.0},
+    "dimensionless": {"percent": 0.01, "%": 0.01},
+}
+ZERO_CELSIUS = 273.15  # [K]
+
 _WORD = r"[A-Za-zµμΩ°%_]+"
 _POWER = r"(?:(?:\*\*|\^)?[+-]?\d{1,2})?"
 # Products and quotients of unit names with short powers and nothing else: pint would also work
@@ -92,6 +116,11 @@ def to_si(values: ArrayLike, unit: str, dimension: str, where: str) -> NDArray[n
     text = unit.strip()
     if text == base:
         return array
+    if text in USUAL.get(dimension, {}):
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.asarray(array * USUAL[dimension][text])
+    if dimension == "temperature" and text in ("degC", "°C"):
+        return np.asarray(array + ZERO_CELSIUS)
     if not text:
         raise InputError(f"{where}: the unit is missing; give a {dimension} in {advice}.")
     unknown = f"{where}: unit {_shown(text)} is not known; give a {dimension} in {advice}."

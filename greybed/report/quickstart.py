@@ -77,7 +77,7 @@ def quickstart(
         "closures", "training two networks and a forest", lambda: _train(folder, data, seed, small)
     )
     limits, _ = stages.run(
-        "exports", "limits, export to C++ and ONNX, replay", lambda: _export(folder, seed)
+        "exports", "limits, export to C++ and ONNX, replay", lambda: _export(folder, seed, small)
     )
     cases: list[dict[str, Any]] = []
     temperatures: dict[str, Arrays] = {}
@@ -143,7 +143,7 @@ def _read_beds() -> Result:
 def _dataset(folder: Path, seed: int, small: bool) -> Result:
     design = quick_design(seed)
     if small:
-        few = [replace(p, count=120) for p in design.packing[::3] if isinstance(p, RandomBed)]
+        few = [replace(p, count=120) for p in design.packing[::6] if isinstance(p, RandomBed)]
         for split, k in (("calibrate", -2), ("test", -1)):
             few[k] = replace(few[k], split=split, fraction=0.4)
         design = replace(design, packing=tuple(few), rays=4_000, emitters=20)
@@ -215,7 +215,8 @@ def _split(arrays: Arrays) -> dict[str, Arrays]:
     return parted
 
 
-def _export(folder: Path, seed: int) -> Result:
+def _export(folder: Path, seed: int, small: bool) -> Result:
+    pairs = 2_000 if small else 20_000
     limits: list[dict[str, Any]] = []
     exports: list[dict[str, Any]] = []
     notes: list[str] = []
@@ -228,9 +229,9 @@ def _export(folder: Path, seed: int) -> Result:
         closure = load(folder / (name + SUFFIX))
         untrained = ViewFactorClosure.untrained(kind, markers, seed)
         columns: dict[str, list[Any]] = {
-            "untrained": check_limits(untrained),
-            "trained": check_limits(closure),
-            "reloaded": check_limits(load(folder / (name + SUFFIX))),
+            "untrained": check_limits(untrained, n=pairs),
+            "trained": check_limits(closure, n=pairs),
+            "reloaded": check_limits(load(folder / (name + SUFFIX)), n=pairs),
         }
         begin = time.perf_counter()
         header = export_cpp(closure, target, name)
@@ -242,7 +243,7 @@ def _export(folder: Path, seed: int) -> Result:
         if find_compiler() is not None:
             program = CompiledClosure(compile_cpp(header, target))
             entry |= {"note": "", **replay(closure, program, CPP_TOLERANCE)}
-            columns["C++"] = check_limits(closure, program.evaluate)
+            columns["C++"] = check_limits(closure, program.evaluate, n=pairs)
         exports.append(entry | {"seconds": time.perf_counter() - begin})
         begin = time.perf_counter()
         graph = export_onnx(closure, target / f"{name}.onnx")
@@ -255,7 +256,7 @@ def _export(folder: Path, seed: int) -> Result:
                 "seconds": time.perf_counter() - begin,
             }
         )  # fmt: skip
-        columns["ONNX"] = check_limits(closure, session.evaluate)
+        columns["ONNX"] = check_limits(closure, session.evaluate, n=pairs)
         for k, case in enumerate(columns["trained"]):
             limits.append(
                 {

@@ -36,6 +36,6 @@ def draw_down_study(seed=1, truth=(0.45, 0.25), runs=16, twin=None, noise=True, 
     )
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_study():
     return draw_down_study

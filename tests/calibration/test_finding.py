@@ -146,15 +146,18 @@ def _stored(folder):
         return 0
 
 
-def test_workers_change_nothing(make_study, tmp_path):
-    alone = calibrate(make_study(runs=10, batch=2))
-    others = calibrate(make_study(runs=10, batch=2, workers=1))
+@pytest.fixture(scope="module")
+def alone(make_study):
+    return calibrate(make_study(runs=8, batch=2))
+
+
+def test_workers_change_nothing(make_study, alone):
+    others = calibrate(make_study(runs=8, batch=2, workers=1))
     assert plain(alone) == plain(others)
 
 
-def test_a_scheduler_changes_nothing(make_study):
+def test_a_scheduler_changes_nothing(make_study, alone):
     distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
-    alone = calibrate(make_study(runs=8, batch=2))
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
     ) as cluster:

@@ -49,8 +49,8 @@ def made(tmp_path_factory):
 
     run("pack --count 60 --fraction 0.4 --sizes mono:1mm --out {d}/bed.h5")
     run("dataset viewfactor {d}/design.toml --out {d}/data.h5")
-    run("train viewfactor {d}/data.h5 --epochs 2 --name mlp --out {d}")
-    run("train viewfactor {d}/data.h5 --model forest --name forest --out {d}")
+    run("train viewfactor {d}/data.h5 --epochs 2 --no-curve --name mlp --out {d}")
+    run("train viewfactor {d}/data.h5 --model forest --no-curve --name forest --out {d}")
     run("trace {d}/bed.csv --rays 50 --out {d} --quiet")
     (folder / "view_factors.h5").rename(folder / "factors.h5")
     return folder

@@ -52,7 +52,7 @@ def fitted(form):
     kind, markers = form
     train, held = synthetic_rows(markers, 4000, 1), synthetic_rows(markers, 2000, 2)
     if kind == "mlp":
-        predictor = fit_network(train, held, seed=3, epochs=300)
+        predictor = fit_network(train, held, seed=3, epochs=60)
     else:
         predictor = fit_forest(train, held, seed=3)
     return ViewFactorClosure(MARKER_SETS[markers], predictor, Domain.of(train.features))

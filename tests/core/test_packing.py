@@ -1,5 +1,8 @@
 """Packings: checks at the door, wrapping, pairs and overlaps against brute force, walls."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -135,3 +138,14 @@ def test_summary_has_provenance(tmp_path):
     assert content["rays"] == 3
     assert content["provenance"]["seed"] == 7
     assert len(content["provenance"]["inputs"]["in.csv"]) == 64
+
+
+def test_all_ways_to_a_packing_give_kernels_the_same_types():
+    """Other strides, or arrays that can be written, would compile every kernel once more."""
+    given = np.random.default_rng(0).uniform(0.0, 9.0, (3, 20))
+    made = Packing(given.T, 0.1, box=[9.0, 9.0, 9.0])
+    for packing in (made, copy.deepcopy(made), pickle.loads(pickle.dumps(made))):
+        for array in (packing.centres, packing.radii, packing.box):
+            assert array.flags.c_contiguous
+            assert not array.flags.writeable
+        np.testing.assert_array_equal(packing.centres, given.T)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from greybed.core.errors import InputError
-from greybed.core.units import parse_quantity, to_si
+from greybed.core.units import USUAL, parse_quantity, to_si
 
 
 @pytest.mark.parametrize(
@@ -56,3 +56,23 @@ def test_metres_pass_without_a_digit_changed():
 
 def test_conversion_never_warns_on_overflow():
     assert np.isinf(to_si([1e308], "km", "length", "here")).all()
+
+
+@pytest.mark.parametrize(("dimension", "unit"), [(d, u) for d in USUAL for u in USUAL[d]])
+def test_usual_units_are_what_pint_has(dimension, unit, monkeypatch):
+    rng = np.random.default_rng(0)
+    values = rng.normal(size=500) * 10.0 ** rng.integers(-300, 300, 500)
+    values = np.concatenate([values, [0.0, -0.0, np.nan, np.inf, 1e308]])
+    known = to_si(values, unit, dimension, "here")
+    monkeypatch.setitem(USUAL, dimension, {})
+    np.testing.assert_array_equal(known, to_si(values, unit, dimension, "here"))
+
+
+def test_celsius_is_what_pint_has():
+    import pint
+
+    values = np.random.default_rng(0).uniform(-300.0, 3000.0, 500)
+    registry = pint.UnitRegistry()
+    wanted = registry.Quantity(values, "degC").to("K").magnitude
+    for unit in ("degC", "°C"):
+        np.testing.assert_array_equal(to_si(values, unit, "temperature", "here"), wanted)

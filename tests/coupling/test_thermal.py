@@ -114,8 +114,7 @@ def test_time_integrator_is_of_second_order(chain, steel, rows_of, emissivity):
         environment_temperature=300.0,
     )
     ends = [
-        bed.run(2.0, initial_temperature=500.0, dt=2.0 / n).temperatures
-        for n in (40, 80, 160, 1280)
+        bed.run(2.0, initial_temperature=500.0, dt=2.0 / n).temperatures for n in (20, 40, 80, 640)
     ]
     errors = [np.abs(t - ends[-1]).max() for t in ends[:-1]]
     orders = np.log2(np.array(errors[:-1]) / errors[1:])

@@ -27,22 +27,22 @@ def test_reached_and_true(kind):
         packing = random_packing(40, 0.45, Uniform(1.0, 2.0), seed=8)
     if kind == "overlapping":
         packing = Packing(packing.centres, 1.05 * packing.radii, packing.box, packing.periodic)
-    result = view_factors(packing, rays=2048, rel_error=0.02, least=0.01, seed=1)
+    result = view_factors(packing, rays=2048, rel_error=0.04, least=0.01, seed=1)
     value, error = everything(result)
     large = value >= 0.01
-    assert (error[large] <= 0.02 * value[large]).all()
+    assert (error[large] <= 0.04 * value[large]).all()
     assert result.reciprocal
     exchange = result.factors.toarray() * result.areas[:, None]
     assert np.abs(exchange - exchange.T).max() <= 1e-14 * exchange.max()
-    reference = view_factors(packing, rays=200_000, seed=77)
+    reference = view_factors(packing, rays=50_000, seed=77)
     truth, noise = everything(reference)
     z = (value - truth)[large] / np.hypot(error, noise)[large]
     assert large.sum() > 350
     assert np.abs(z).max() < 5.0
     assert 0.92 < (np.abs(z) < 1.96).mean() < 0.995
     assert (result.cost >= 2048).all()
-    # Independent rays would need (1 - F) / (F 0.02^2), a quarter of a million for F = 0.01.
-    assert result.cost.mean() < 150_000
+    # Independent rays would need (1 - F) / (F 0.04^2), 62,000 for F = 0.01.
+    assert result.cost.mean() < 37_500
 
 
 def test_same_bits_and_smooth():

@@ -34,7 +34,7 @@ def cube_mesh():
 def rows(walls, specular):
     packing = Packing(CENTRES, RADII, walls=walls)
     return exchange_factors(
-        packing, emissivity=[0.6], wall_emissivity=0.4, wall_specular=specular, rays=100_000,
+        packing, emissivity=[0.6], wall_emissivity=0.4, wall_specular=specular, rays=25_000,
         seed=3,
     )[0]  # fmt: skip
 
@@ -51,7 +51,7 @@ def test_polygons_and_meshes_reflect_as_planes_do(specular):
         np.testing.assert_allclose(total, 1.0, atol=1e-12)
         assert (result.escaped == 0.0).all()
         to_walls = result.wall_factors.sum(axis=1) - reference.wall_factors.sum(axis=1)
-        assert np.abs(to_walls).max() < 0.01
+        assert np.abs(to_walls).max() < 0.02  # four standard errors
 
 
 def test_tubes_and_cones_with_lids_are_closed():
@@ -64,7 +64,7 @@ def test_tubes_and_cones_with_lids_are_closed():
         Plane((0, 0, 0), (0, 0, 1)),
         Plane((0, 0, 1), (0, 0, -1)),
     ]
-    options = {"emissivity": [0.5], "wall_emissivity": 0.3, "rays": 200_000, "seed": 5}
+    options = {"emissivity": [0.5], "wall_emissivity": 0.3, "rays": 50_000, "seed": 5}
     a = exchange_factors(Packing(*ball, walls=tube), **options)[0]
     b = exchange_factors(Packing(*ball, walls=endless), **options)[0]
     difference = np.abs(a.wall_factors - b.wall_factors)

@@ -23,8 +23,8 @@ def box():
 @pytest.fixture(scope="module")
 def traced(box):
     return exchange_factors(
-        box, [0.6, 1.0], wall_emissivity=[WALLS, [1.0] * 6], wall_specular=0.3, rays=100_000,
-        wall_rays=100_000, seed=3,
+        box, [0.6, 1.0], wall_emissivity=[WALLS, [1.0] * 6], wall_specular=0.3, rays=30_000,
+        wall_rays=30_000, seed=3,
     )  # fmt: skip
 
 
@@ -50,7 +50,7 @@ def test_rows_are_closed_and_reciprocal(traced):
 
 
 def test_black_walls_have_view_factors(traced, box):
-    black, view = traced[1].patches, patch_factors(box, rays=100_000)
+    black, view = traced[1].patches, patch_factors(box, rays=30_000)
     error = np.hypot(black.wall_stderr, view.to_walls_stderr)
     assert (np.abs(black.wall_factors - view.to_walls) < 4.5 * error).all()
     error = np.hypot(black.stderr.toarray(), view.to_spheres_stderr.toarray())
@@ -62,14 +62,14 @@ def test_two_plates_through_the_network():
     tiny = Packing([[0.5, 0.5, 0.05]], 1e-4, walls=box_walls((0, 0, 0), (1, 1, 0.1)))
     (rows,) = exchange_factors(
         tiny, [0.5], wall_emissivity=[0.0, 0.0, 0.0, 0.0, 0.8, 0.3],
-        wall_specular=[1.0] * 4 + [0.0] * 2, rays=1_000, wall_rays=400_000,
+        wall_specular=[1.0] * 4 + [0.0] * 2, rays=1_000, wall_rays=100_000,
     )  # fmt: skip
     result = radiative_network(
         rows, temperatures=400.0, wall_temperatures=[None] * 4 + [600.0, 400.0]
     )
     exact = SIGMA * (600.0**4 - 400.0**4) / (1.0 / 0.8 + 1.0 / 0.3 - 1.0)
     error = rows.patches.wall_stderr[4, 5] / rows.patches.wall_factors[4, 5]
-    assert error < 2e-3
+    assert error < 4e-3
     assert result.wall_heats[4] == pytest.approx(exact, rel=4.0 * error)
 
 

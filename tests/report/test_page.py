@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from greybed.core.files import OutputError
-from greybed.report import render_page
+from greybed.report import picture, render_page
 
 NAME = "viewfactor_mlp_pencil"
 SCORE = {
@@ -107,6 +107,14 @@ class Reader(HTMLParser):
     @property
     def text(self):
         return re.sub(r"\s+", " ", " ".join(self.texts))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse_pictures():
+    """One ray a pixel: these tests look at the page, not at the edges in its pictures."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(picture, "SUPERSAMPLING", 1)
+        yield
 
 
 @pytest.fixture(scope="module")

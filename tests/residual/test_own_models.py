@@ -90,6 +90,7 @@ def bed(tmp_path_factory):
     return folder
 
 
+@pytest.mark.usefixtures("three_folds")
 def test_a_case_that_does_not_radiate_lacks_radiation(bed, tmp_path):
     study = read_study(bed / "study.toml")
     found = diagnose(study)
@@ -107,6 +108,7 @@ def test_a_case_that_does_not_radiate_lacks_radiation(bed, tmp_path):
     assert case.packing.file.exists()
 
 
+@pytest.mark.usefixtures("three_folds")
 def test_runs_of_a_case_are_kept(bed, monkeypatch):
     from greybed.residual.models.runner import ThermalRunner
 
