@@ -38,7 +38,7 @@ NAMES = {"docs/formats.md": {"temperatures": [300.0] * 4000}}
 SMALLER = {
     "docs/closures.md": (("--epochs 10", "--epochs 10 --no-curve"),),
     "docs/overlaps.md": (("--rays 2000", "--rays 100"),),
-    "docs/packings.md": (("--count 10000", "--count 1000"), ("packing(5000,", "packing(500,")),
+    "docs/packings.md": (("--count 10000", "--count 1000"), ("packing(5000,", "packing(1500,")),
     "docs/raytrace.md": (
         ("4k.dump --rays 2000", "4k.dump --rays 100"),
         ("view_factors(bed, rays=2000, seed=1)", "view_factors(bed, rays=100, seed=1)"),

@@ -123,7 +123,8 @@ class Views:
     @property
     def wall_forces(self) -> Array:
         """Forces on the walls, shape (walls, 3) [N]."""
-        return self._lists.surfaces.force[:, :, :3].sum(axis=0)
+        surfaces = self._lists.surfaces
+        return surfaces.force[:, : len(surfaces.motion), :3].sum(axis=0)
 
     def plane_of(self, name: str) -> tuple[Array, Array]:
         """Normal of a plane, shape (3,), and its velocity, spin and centre, shape (9,)."""
