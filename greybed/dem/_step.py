@@ -1,8 +1,10 @@
 """Compiled time steps: velocity Verlet over blocks of particles, until a list has to be renewed.
 
 Threads share the blocks of each part of a step. One leads: it says which part comes next and waits
-until all its blocks are done. Whoever is free takes the next block, so a helper that comes late,
-or never, holds nobody up; sums have one order whoever does them.
+until all its blocks are done. Each thread begins with its own range of blocks, the same in every
+step: what a core has written last is dear to read for another one. Whoever is done with that takes
+blocks of the others, so a helper that comes late, or never, holds nobody up; sums have one order
+whoever does them.
 """
 
 from typing import NamedTuple
@@ -24,14 +26,12 @@ STEPS, FORCES, FINISH = 0, 1, 2
 DONE, RENEW, LOST, HELPED = 0, 1, 2, 3
 # Parts of a step.
 _BODIES, _KICKS, _PAIRS = 0, 1, 2
-# What threads share: which part and its next block, blocks done, and beside them, written while
-# nobody works, the part and how to do it. Each counter has a line of the cache of its own.
-TICKET, _READY, _PART, _ENDS, _STARTS, _LOOKS = 0, 8, 16, 17, 18, 19
-SHARED = 24
-# A ticket is the number of the part in its upper half, and the next block in the lower one.
-_UPPER = 32
-_LOWER = (1 << _UPPER) - 1
-NO_WORK, STOP = 1 << 31, -(1 << 62)
+# What threads share. The number of the part that is under way, blocks done; written while nobody
+# works, the part, how to do it and how many threads there are; then for each thread the next block
+# of its range, counted from the range's begin. What threads wait for or count in has a line of the
+# cache of its own.
+GO, _READY, _PART, _ENDS, _STARTS, _LOOKS, THREADS, _NEXT, _LINE = 0, 8, 16, 17, 18, 19, 20, 24, 8
+STOP, _NO_BLOCK = -1, 1 << 31
 # Looks at a counter before a thread that waits lets other programs run.
 _PATIENCE = 2000
 
@@ -92,6 +92,17 @@ class Law(NamedTuple):
     limit: bool
     row: np.ndarray  # (kinds, kinds) int64, row of ``table`` of two materials
     table: np.ndarray  # (pairs, COLUMNS)
+
+
+def new_team(threads: int) -> np.ndarray:
+    """What ``threads`` share, before the first part; it begins with a line of the cache."""
+    size = _NEXT + threads * _LINE
+    room = np.zeros(size + _LINE, np.int64)
+    begin = -room.ctypes.data % (8 * _LINE) // 8
+    team = room[begin : begin + size]
+    team[_NEXT::_LINE] = _NO_BLOCK
+    team[THREADS] = threads
+    return team
 
 
 @njit(**_OPTIONS)
@@ -180,33 +191,38 @@ def _forces_of_block(b, state, near, surfaces, law, edge, periodic, dt, looks, d
 
 @njit(**_OPTIONS)
 def _share(
-    team, state, near, rigid, surfaces, law, edge, periodic, push, dt, worst, deepest
+    who, team, state, near, rigid, surfaces, law, edge, periodic, push, dt, worst, deepest
 ):  # fmt: skip
-    """Blocks of the present part until none is left; returns the ticket that got none."""
-    blocks, bodies = near.block.size - 1, rigid.first.size - 1
-    while True:
-        ticket = add(team, TICKET, 1)
-        b = ticket & _LOWER
-        if ticket < 0 or b >= blocks:
-            return ticket
-        part = team[_PART]
-        if part == _PAIRS:
-            # From the last one on: what the kicks have come to last is still near.
-            b = blocks - 1 - b
-            _forces_of_block(
-                b, state, near, surfaces, law, edge, periodic, dt, team[_LOOKS] != 0, deepest[b]
-            )
-        elif part == _KICKS:
-            _kick_and_drift(
-                near.block[b], near.block[b + 1], state, near, push, dt, team[_ENDS],
-                team[_STARTS], worst[b],
-            )  # fmt: skip
-        else:
-            kick_some(
-                b * bodies // blocks, (b + 1) * bodies // blocks, rigid, state, near, push, edge,
-                dt, team[_ENDS], team[_STARTS],
-            )  # fmt: skip
-        add(team, _READY, 1)
+    """Blocks of the present part until none is left, those of the thread's own range first."""
+    blocks, bodies, threads = near.block.size - 1, rigid.first.size - 1, team[THREADS]
+    done = 0
+    for turn in range(threads):
+        whose = (who + turn) % threads
+        begin, end = whose * blocks // threads, (whose + 1) * blocks // threads
+        while True:
+            b = begin + add(team, _NEXT + whose * _LINE, 1)
+            if b >= end:
+                break
+            part = team[_PART]
+            if part == _PAIRS:
+                # From the last one on: what the kicks have come to last is still near.
+                b = begin + end - 1 - b
+                _forces_of_block(
+                    b, state, near, surfaces, law, edge, periodic, dt, team[_LOOKS] != 0,
+                    deepest[b],
+                )  # fmt: skip
+            elif part == _KICKS:
+                _kick_and_drift(
+                    near.block[b], near.block[b + 1], state, near, push, dt, team[_ENDS],
+                    team[_STARTS], worst[b],
+                )  # fmt: skip
+            else:
+                kick_some(
+                    b * bodies // blocks, (b + 1) * bodies // blocks, rigid, state, near, push,
+                    edge, dt, team[_ENDS], team[_STARTS],
+                )  # fmt: skip
+            done += 1
+    add(team, _READY, done)
 
 
 @njit(**_OPTIONS)
@@ -221,39 +237,43 @@ def _furthest(worst):
 
 @njit(**_OPTIONS)
 def work(
-    order, steps, leads, team, state, near, rigid, surfaces, law, edge, periodic, push, dt, skin,
+    order, steps, who, team, state, near, rigid, surfaces, law, edge, periodic, push, dt, skin,
     wall_pace, wall_way, pending, worst, deepest,
 ):  # fmt: skip
     """Up to ``steps`` steps; returns those done, why it ended, and the particle that was at fault.
 
     ``pending`` says that the loads are of the present places but not yet in the velocities: so it
     is after a step, and where lists were renewed between the way and the forces. Forces across
-    blocks wait in ``near.crossing``. ``team`` (SHARED) begins with NO_WORK as its ticket; helpers
-    do not lead and return when the leader has put STOP there.
+    blocks wait in ``near.crossing``. ``team`` is one of ``new_team``; thread 0 leads, the others
+    help and return when somebody has put STOP at GO.
     """
-    blocks, step, number = near.block.size - 1, 0, 0
+    blocks, step, number, looks = near.block.size - 1, 0, 0, 0
+    while who > 0:
+        go = look(team, GO)
+        if go == STOP:
+            return 0, HELPED, -1, wall_way
+        if go == number:
+            looks += 1
+            rest(looks > _PATIENCE)
+            continue
+        number, looks = go, 0
+        _share(
+            who, team, state, near, rigid, surfaces, law, edge, periodic, push, dt, worst, deepest
+        )
     first = _BODIES if rigid.first.size > 1 else _KICKS
     part = _PAIRS if order == FORCES else first
-    if leads:
-        team[_STARTS] = order == STEPS
-        team[_ENDS] = pending
-        team[_LOOKS] = order == FORCES
+    team[_STARTS] = order == STEPS
+    team[_ENDS] = pending
+    team[_LOOKS] = order == FORCES
     while True:
-        if leads:
-            number += 1
-            team[_PART] = part
-            put(team, TICKET, number << _UPPER)
-        ticket = _share(
-            team, state, near, rigid, surfaces, law, edge, periodic, push, dt, worst, deepest
+        number, looks = number + 1, 0
+        team[_PART] = part
+        for k in range(team[THREADS]):
+            put(team, _NEXT + k * _LINE, 0)
+        put(team, GO, number)
+        _share(
+            who, team, state, near, rigid, surfaces, law, edge, periodic, push, dt, worst, deepest
         )
-        looks = 0
-        if not leads:
-            if ticket < 0:
-                return 0, HELPED, -1, wall_way
-            while look(team, TICKET) >> _UPPER == ticket >> _UPPER:
-                looks += 1
-                rest(looks > _PATIENCE)
-            continue
         while look(team, _READY) < number * blocks:
             looks += 1
             rest(looks > _PATIENCE)
@@ -264,14 +284,14 @@ def work(
                 near.crossing[:, :] = 0.0
                 return 0, DONE, -1, wall_way
             team[_ENDS] = 1
-            largest, who = _furthest(worst)
+            largest, at_fault = _furthest(worst)
             if wall_pace > 0.0:
                 move(surfaces.kinds, surfaces.data, surfaces.wall, surfaces.motion, dt)
                 wall_way += wall_pace * dt
             if not largest < np.inf:
-                return step, LOST, who, wall_way
+                return step, LOST, at_fault, wall_way
             if 2.0 * np.sqrt(largest) > skin - wall_way:
-                return step, RENEW, who, wall_way
+                return step, RENEW, at_fault, wall_way
             team[_LOOKS] = step == steps - 1
             part = _PAIRS
         else:

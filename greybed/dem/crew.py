@@ -8,7 +8,6 @@ from threading import Thread
 from typing import TypeVar
 
 import numba
-import numpy as np
 
 from greybed.dem import _step
 
@@ -32,24 +31,23 @@ def run_steps(
     order, steps, state, near, *others
         As ``_step.work`` takes them.
     """
-    team = np.zeros(_step.SHARED, np.int64)
-    team[_step.TICKET] = _step.NO_WORK
     # What finishes a run is a tenth of a step.
     few = order == _step.FINISH or steps * len(state.place) < WORTH_HELP
     alone = few or numba.config.DISABLE_JIT
     helpers = 0 if alone else min(threads, len(near.block) - 1) - 1
+    team = _step.new_team(1 + helpers)
     given = (team, state, near, *others)
     crew = [
-        Thread(target=_step.work, args=(order, steps, False, *given), daemon=True)
-        for _ in range(helpers)
+        Thread(target=_step.work, args=(order, steps, 1 + k, *given), daemon=True)
+        for k in range(helpers)
     ]
     try:
         for helper in crew:
             helper.start()
-        return _step.work(order, steps, True, *given)
+        return _step.work(order, steps, 0, *given)
     finally:
         # Also where this thread is interrupted before it leads.
-        team[_step.TICKET] = _step.STOP
+        team[_step.GO] = _step.STOP
         for helper in crew:
             if helper.is_alive():
                 helper.join()

@@ -36,10 +36,10 @@ def test_each_ticket_is_taken_once():
 def test_helpers_end_when_the_leader_is_interrupted(monkeypatch):
     helped = []
 
-    def work(order, steps, leads, team, *others):
-        if leads:
+    def work(order, steps, who, team, *others):
+        if who == 0:
             raise KeyboardInterrupt
-        while team[_step.TICKET] != _step.STOP:
+        while team[_step.GO] != _step.STOP:
             pass
         helped.append(order)
 
