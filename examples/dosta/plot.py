@@ -27,7 +27,7 @@ def columns(path: Path) -> dict[str, NDArray[np.float64]]:
 
 def results(folder: Path, start: str) -> list[tuple[dict[str, Any], Path]]:
     """Results whose names begin so, with the paths of their samples."""
-    found = sorted(folder.glob(f"{start}*.json"))
+    found = sorted(folder.glob(f"{start}*.json"), key=lambda path: path.stem)
     return [(json.loads(path.read_text()), path.with_suffix(".csv")) for path in found]
 
 
@@ -92,7 +92,7 @@ def impact(axes: Any, folder: Path, reference: dict[str, Any]) -> None:
         here = ~np.isnan(table["z"])
         t = 1e3 * (table["time"][here] - result["begin_s"])
         label = f"greybed, E / {result['softness']:g}"
-        colour = OURS if not result["changed"] else "k"
+        colour = OURS if result["softness"] == 1.0 else "k"
         axes.plot(t, 1e3 * table["z"][here], color=colour, label=label)
     for name, mark, colour in (("LIGGGHTS", "o", THEIRS), ("MUSEN", "x", OTHERS)):
         low = reference["impact_25k"][name]

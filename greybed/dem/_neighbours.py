@@ -165,14 +165,6 @@ def carry_over(
 
 
 @njit(**_OPTIONS)
-def blocks_of(n, size, block):
-    """First particle of each block of near equal size."""
-    count = block.size - 1
-    for b in range(count + 1):
-        block[b] = b * n // count
-
-
-@njit(**_OPTIONS)
 def list_crossings(block, first, partner, slot, into, slots):
     """Pairs that reach into another block: a slot each for the force on the far particle.
 

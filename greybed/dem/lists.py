@@ -97,9 +97,7 @@ class Lists:
     def _lay_blocks(self, n: int) -> None:
         """Blocks for so many particles, and what has a row for each of them."""
         blocks = max(1, round(n / BLOCK))
-        block = np.empty(blocks + 1, np.int64)
-        _neighbours.blocks_of(n, BLOCK, block)
-        self.near = self.near._replace(block=block)
+        self.near = self.near._replace(block=_even(np.arange(n + 1), blocks))
         self.surfaces = self.surfaces._replace(
             force=np.zeros((blocks, len(self.surfaces.motion) + _APART, 6))
         )
@@ -303,12 +301,14 @@ class Lists:
             ),
         )  # fmt: skip
         into, slots = np.empty(n + 1, np.int64), np.empty(found, np.int32)
-        crossings = _neighbours.list_crossings(near.block, first, partner, slot, into, slots)
+        # A particle is a part of the work of its pairs. Those of the first blocks own more of them.
+        block = _even(first + np.arange(n + 1), len(near.block) - 1)
+        crossings = _neighbours.list_crossings(block, first, partner, slot, into, slots)
         owner = np.repeat(np.arange(n, dtype=np.int32), np.diff(first))
         self.near = _step.Near(
             first, owner, partner, shift, touch, history, slot, np.zeros((crossings, 6)), into,
             slots[:crossings].copy(),
-            np.repeat(np.arange(n, dtype=np.int32), np.diff(into)), near.block,
+            np.repeat(np.arange(n, dtype=np.int32), np.diff(into)), block,
         )  # fmt: skip
 
     def _renew_surfaces(self, order: Index) -> None:
@@ -357,6 +357,14 @@ class Lists:
         """Memory of state and lists [B]."""
         parts = (*self.state, *self.near, *self.surfaces, *self.rigid, self.ident)
         return sum(part.nbytes for part in parts)
+
+
+def _even(work: Index, blocks: int) -> Index:
+    """First particle of each block, with as much to do in one as in another.
+
+    ``work`` (n + 1) is what there is to do before each particle, and in all.
+    """
+    return np.searchsorted(work, np.arange(blocks + 1) * work[-1] // blocks)
 
 
 def _pairs(
