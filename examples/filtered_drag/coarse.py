@@ -7,6 +7,9 @@ and 8 times as coarse do not, and are run without correction, with published mod
 closures that come with greybed. Compared are the slip of the means (gas less solids along gravity,
 each weighted with its phase) and the spread of the solid fraction, filtered to the coarse cells in
 the fine run. Intervals are over seeds of the perturbation that clusters grow from.
+
+Fine runs are kept in the folder as they finish (fine.json): a second call with the same settings
+does not repeat them, so other closures (--models) cost coarse runs only.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ import json
 import math
 import time
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -25,6 +29,7 @@ import numpy as np
 
 from greybed.closures.drag import drag_law
 from greybed.closures.drag.filtered import Material
+from greybed.core.files import atomic_path
 from greybed.coupling.filtered_drag import filtered_drag
 from greybed.datasets.drag_design import FlowDesign
 from greybed.datasets.drag_filters import box_mean
@@ -35,6 +40,8 @@ MODELS = (
     "none", "radl-sundaresan", "igci", "milioli", "shipped:filtered_drag_mlp_plain",
     "shipped:filtered_drag_mlp_full", "shipped:filtered_drag_forest_plain",
 )  # fmt: skip
+# What decides a fine run besides its seed.
+OF_FLOW = ("cells", "cell", "fraction", "diameter", "density", "develop", "length")
 
 
 def design_of(options: argparse.Namespace, factor: int, seed: int) -> FlowDesign:
@@ -78,12 +85,51 @@ def run(
     return found | {f"spread_{w}": float(m) for w, m in zip(widths, means[1:], strict=True)}
 
 
+def fine_runs(options: argparse.Namespace, out: Path) -> list[dict[str, float]]:
+    """The fine runs, those of the folder where their settings are the same."""
+    settings = json.loads(json.dumps({name: getattr(options, name) for name in OF_FLOW}))
+    file = out / "fine.json"
+    kept = json.loads(file.read_text()) if file.exists() else {}
+    fine: list[dict[str, float]] = kept["fine"] if kept.get("settings") == settings else []
+    for seed in range(options.seeds):
+        again = seed < len(fine)
+        if not again:
+            fine.append(run(design_of(options, 1, seed), "none", options, COARSE))
+            with atomic_path(file) as path:
+                path.write_text(json.dumps({"settings": settings, "fine": fine}, indent=1))
+        took = "of an earlier call" if again else f"{fine[seed]['seconds']:.0f} s"
+        print(f"fine, seed {seed}: slip {fine[seed]['slip']:.4g} m/s, {took}", flush=True)
+    return fine[: options.seeds]
+
+
 def interval(values: list[float]) -> float:
     """Half of the 95 % interval of a mean, by Student's t."""
     from scipy.stats import t
 
     n = len(values)
     return float(t.ppf(0.975, n - 1) * np.std(values, ddof=1) / math.sqrt(n)) if n > 1 else math.nan
+
+
+def draw(
+    out: Path, models: list[str], table: list[dict[str, Any]], truth: float, half: float
+) -> None:
+    """Slips with their intervals, beside the band of the fine run."""
+    figure, axes = plt.subplots(figsize=(7.0, 3.6), layout="constrained")
+    x = np.arange(len(models))
+    for k, factor in enumerate(COARSE):
+        rows = [row for row in table if row["factor"] == factor]
+        axes.errorbar(
+            x + 0.15 * (k - 0.5), [row["slip"] for row in rows],
+            [row["slip_interval"] for row in rows], fmt="os"[k], capsize=3,
+            label=f"cells {factor} times as wide",
+        )  # fmt: skip
+    axes.axhspan(truth - half, truth + half, color="0.85", label="fine, 95 %")
+    names = [Path(m.removeprefix("shipped:filtered_drag_")).stem for m in models]
+    axes.set_xticks(x, names, rotation=20)
+    axes.set_ylabel("slip of the means [m/s]")
+    axes.legend(frameon=False)
+    figure.savefig(out / "coarse.svg")
+    figure.savefig(out / "coarse.png", dpi=120)
 
 
 def main() -> int:
@@ -100,25 +146,23 @@ def main() -> int:
     parser.add_argument("--density", type=float, default=1300.0, help="[kg/m3]")
     parser.add_argument("--develop", type=float, default=5.0, help="terminal velocities over g")
     parser.add_argument("--length", type=float, default=4.0, help="the same, averaged over")
+    parser.add_argument("--models", nargs="+", default=MODELS, help="published, shipped:, files")
     options = parser.parse_args()
     out = Path(options.out)
     out.mkdir(parents=True, exist_ok=True)
-    fine = []
-    for seed in range(options.seeds):
-        fine.append(run(design_of(options, 1, seed), "none", options, COARSE))
-        print(f"fine, seed {seed}: slip {fine[-1]['slip']:.4g} m/s, {fine[-1]['seconds']:.0f} s")
+    fine = fine_runs(options, out)
     truth = float(np.mean([f["slip"] for f in fine]))
-    table: list[dict[str, object]] = []
+    table: list[dict[str, Any]] = []
     for factor in COARSE:
         spread = float(np.mean([f[f"spread_{factor}"] for f in fine]))
-        for model in MODELS:
+        for model in options.models:
             runs = [
                 run(design_of(options, factor, seed), model, options, (1,))
                 for seed in range(options.seeds)
             ]
             slips = [r["slip"] for r in runs]
             row = {
-                "factor": factor, "model": model, "slip": float(np.mean(slips)),
+                "factor": factor, "model": model, "slip": float(np.mean(slips)), "slips": slips,
                 "slip_interval": interval(slips),
                 "slip_error": float(np.mean(slips)) / truth - 1.0,
                 "spread": float(np.mean([r["spread_1"] for r in runs])), "spread_fine": spread,
@@ -135,21 +179,7 @@ def main() -> int:
     (out / "coarse.json").write_text(
         json.dumps({"fine": fine, "slip": truth, "slip_interval": half, "table": table}, indent=1)
     )
-    figure, axes = plt.subplots(figsize=(7.0, 3.6), layout="constrained")
-    x = np.arange(len(MODELS))
-    for k, factor in enumerate(COARSE):
-        rows = [row for row in table if row["factor"] == factor]
-        axes.errorbar(
-            x + 0.15 * (k - 0.5), [row["slip"] for row in rows],
-            [row["slip_interval"] for row in rows], fmt="os"[k], capsize=3,
-            label=f"cells {factor} times as wide",
-        )  # fmt: skip
-    axes.axhspan(truth - half, truth + half, color="0.85", label="fine, 95 %")
-    axes.set_xticks(x, [m.removeprefix("shipped:filtered_drag_") for m in MODELS], rotation=20)
-    axes.set_ylabel("slip of the means [m/s]")
-    axes.legend(frameon=False)
-    figure.savefig(out / "coarse.svg")
-    figure.savefig(out / "coarse.png", dpi=120)
+    draw(out, options.models, table, truth, half)
     return 0
 
 

@@ -76,10 +76,11 @@ def score_of(rows: DragRows, force: Array) -> dict[str, float]:
         R² of the drift flux along gravity (``drift_r2``), of all of it (``drift_r2_vector``), of
         the force along gravity (``force_r2``), of H on clean rows (``kept_r2``; guesses kept
         between 0 and 3), rms error and bias of H there, rms error of the drift flux along gravity
-        (``drift_rms``), and counts.
+        (``drift_rms``), the summed force along gravity over the true one, less 1 (``force_bias``),
+        and counts.
     """
     truth, guess = rows.drift(rows.force), rows.drift(force)
-    clean = rows.clean
+    clean, whole = rows.clean, rows.force[:, 0].sum()
     kept = rows.kept[clean]
     mine = (force[:, 0] / np.where(clean, rows.unfiltered[:, 0], 1.0))[clean]
     # Guesses that know no bound get the one of the rows.
@@ -92,6 +93,7 @@ def score_of(rows: DragRows, force: Array) -> dict[str, float]:
         "kept_rms": float(np.sqrt(np.mean((mine - kept) ** 2))),
         "kept_bias": float(np.mean(mine - kept)),
         "drift_rms": float(np.sqrt(np.mean((guess[:, 0] - truth[:, 0]) ** 2))),
+        "force_bias": float(force[:, 0].sum() / whole - 1.0) if whole else float("nan"),
         "rows": len(rows),
         "clean_rows": int(clean.sum()),
     }

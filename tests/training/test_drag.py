@@ -185,6 +185,14 @@ def test_rows_are_without_units(data):
     assert r_squared(drift, drift) == 1.0
 
 
+def test_bias_of_the_summed_force_is_that_of_the_sum(data):
+    rows = drag_rows(data)
+    assert score_of(rows, 0.9 * rows.force)["force_bias"] == pytest.approx(-0.1, rel=1e-12)
+    # What one row lacks another may have: it says nothing of single rows.
+    swapped = np.concatenate([rows.force[1:], rows.force[:1]])
+    assert score_of(rows, swapped)["force_bias"] == pytest.approx(0.0, abs=1e-12)
+
+
 def test_folds_never_split_a_case():
     group = np.repeat(np.arange(7), 13)
     fold = folds_of(group, 3)
