@@ -85,13 +85,13 @@ def parts(sides: Sides, fluid: Fluid, mass: Array, flux: Faces, void: Array, dt:
 
 def advance(
     sides: Sides, fluid: Fluid, t: Array, old: Array, new: Array, flux: Faces, void: Array,
-    heating: Heating, dt: float,
+    heating: Heating, dt: float, work: Array | None = None,
 ) -> tuple[Array, Array]:  # fmt: skip
     """Temperatures after a step, and the heat that particles have given per volume and time.
 
     ``old`` and ``new`` are masses per volume before and after, of which ``flux`` makes one from the
     other. Heun's method in the conservative form, bounded where no heat is given; heat from
-    particles is implicit.
+    particles is implicit. ``work`` per volume and time is what else the gas gets [W/m3].
     """
     c = forces.rates(sides)
     spill = np.zeros_like(t)
@@ -108,6 +108,7 @@ def advance(
         content = mass * t
         inert = cp * after + h * heating.coefficient
         given = h * (heating.coefficient * heating.target + heating.source)
+        given = given if work is None else given + h * work
         rate = _rate(sides, fluid, t, flux, conductivity, spill)
         # The first stage knows of the heat too: a steady state is one of both stages.
         between = (cp * (content + h * rate) + given) / inert
@@ -116,4 +117,4 @@ def advance(
         t = (cp * content + given) / inert
         heat += cp * (after * t - content) / (h * count)
         mass = after
-    return t, heat
+    return t, heat if work is None else heat - work

@@ -33,7 +33,8 @@ class Fluid:
         Of an ideal gas [kg mol-1]: its density is ``pressure * molar_mass / (R T)`` at low Mach
         number, where only the mean pressure counts.
     pressure, temperature : float
-        Mean pressure [Pa] and first temperature [K] of an ideal gas.
+        Mean pressure [Pa], without an outlet the first one, and first temperature [K] of an ideal
+        gas.
 
     Raises
     ------
@@ -67,6 +68,13 @@ class Fluid:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise InputError(f"{name} = {value:g} [{unit}] must be at least 0.")
+
+    @property
+    def gas_constant(self) -> float:
+        """Of an ideal gas [J kg-1 K-1]."""
+        if self.molar_mass is None:
+            raise InputError("a gas of constant density has no gas constant; give a molar_mass.")
+        return GAS_CONSTANT / self.molar_mass
 
     def density_at(self, temperature: Array | float) -> Array | float:
         """Of the gas at a temperature [K] in [kg m-3]."""

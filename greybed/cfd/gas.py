@@ -16,6 +16,7 @@ from greybed.cfd.gas_state import Budget, Gas, Inputs, StepReport, Tally
 from greybed.cfd.gas_step import Part, TooLong
 from greybed.cfd.grid import AXES, Grid
 from greybed.cfd.projection import Projection
+from greybed.cfd.sealed import check_sealed, is_sealed
 from greybed.core.errors import InputError
 
 __all__ = [
@@ -120,14 +121,9 @@ class GasSolver:
             t[...] = temperature
             if not (np.isfinite(t).all() and (t > 0.0).all()):
                 raise InputError("temperature: all values [K] must be above 0.")
-        if fluid.molar_mass is not None:
-            if temperature is None:
-                raise InputError("an ideal gas needs a temperature at the start [K].")
-            if self.sides.closed:
-                raise InputError(
-                    "an ideal gas in a closed box changes its mean pressure, which is not solved "
-                    "for; give one side an Outlet."
-                )
+        if fluid.molar_mass is not None and temperature is None:
+            raise InputError("an ideal gas needs a temperature at the start [K].")
+        check_sealed(self.sides, fluid)
         if self._energy:
             for (axis, end), side in self.sides.of.items():
                 if isinstance(side, Inflow) and side.temperature is None:
@@ -150,6 +146,7 @@ class GasSolver:
         self.state = Gas(
             (velocity[0], velocity[1], velocity[2]), np.zeros(grid.shape), eps,
             eps * fluid.density_at(t), t, 0.0, np.array(gradient, dtype=np.float64),
+            mean_pressure=fluid.pressure,
         )  # fmt: skip
         self._projection.hold_rims(self.state.velocity, eps)
 
@@ -171,12 +168,37 @@ class GasSolver:
         return self.state.temperature
 
     @property
+    def sealed(self) -> bool:
+        """Whether an ideal gas has no outlet, so that its mean pressure changes."""
+        return is_sealed(self.sides, self.fluid)
+
+    @property
+    def mean_pressure(self) -> float:
+        """Of an ideal gas, absolute [Pa]; its density is that at this pressure."""
+        return self.state.mean_pressure
+
+    @property
     def time(self) -> float:
         """[s]."""
         return self.state.time
 
     def set_boundary(self, name: str, side: Side) -> None:
-        """Put another side in place for the steps to come, such as an inflow that changes."""
+        """Put another side in place for the steps to come, such as an inflow that changes.
+
+        Raises
+        ------
+        InputError
+            For one that the box cannot have; an ideal gas is not sealed or let out meanwhile.
+        """
+        sides = Sides(self.grid, {f"{AXES[a]}{'-+'[e]}": s for (a, e), s in self.sides.of.items()
+                                  if self.sides.wide[a]})  # fmt: skip
+        sides.set(name, side)
+        check_sealed(sides, self.fluid)
+        if is_sealed(sides, self.fluid) != self.sealed:
+            raise InputError(
+                f"side {name}: an ideal gas cannot be sealed or let out during a run, for the mean "
+                "pressure would jump; keep the outlets."
+            )
         self.sides.set(name, side)
 
     def set_velocity(self, u: Array, v: Array, w: Array) -> None:
@@ -203,6 +225,7 @@ class GasSolver:
             "pressure": s.pressure, "void_fraction": s.void_fraction, "mass": s.mass,
             "temperature": s.temperature, "gradient": s.gradient,
             "times": np.array([s.time, s.before]), "spilled": s.spilled,
+            "mean_pressure": np.array(s.mean_pressure),
         }  # fmt: skip
         for axis, name in enumerate("uvw"):
             out[name] = s.velocity[axis]
@@ -242,6 +265,8 @@ class GasSolver:
             kept[1],
             before,
             np.array(saved["spilled"]),
+            # Where it is absent, the checkpoint is of an outlet's pressure.
+            float(saved.get("mean_pressure", self.fluid.pressure)),
         )
 
     # -- a step -----------------------------------------------------------------------------
@@ -337,7 +362,7 @@ class GasSolver:
         return StepReport(
             self.state.time, dt, tally.parts, tally.iterations, tally.divergence, tally.courant,
             tally.imbalance, state.velocity if tally.parts == 1 else (seen[0], seen[1], seen[2]),
-            tally.heat, Budget(*tally.budget) if self.budget else None,
+            tally.heat, Budget(*tally.budget) if self.budget else None, state.mean_pressure,
         )  # fmt: skip
 
     def _check_void(self, eps: Array) -> None:

@@ -34,6 +34,8 @@ class Gas:
         [s].
     spilled : array, shape (3,)
         Momentum per time that convection then left to the lag of the budget [N].
+    mean_pressure : float
+        Of an ideal gas, absolute [Pa]: the same everywhere, and constant where there is an outlet.
     """
 
     velocity: Faces
@@ -47,6 +49,7 @@ class Gas:
     friction: Faces | None = None
     before: float = 0.0
     spilled: Array = field(default_factory=lambda: np.zeros(3))
+    mean_pressure: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +96,8 @@ class StepReport:
     heat : array or None
         That the gas has got from the particles, mean over the step [W m-3].
     budget : Budget or None
+    mean_pressure : float
+        Of an ideal gas at the end, absolute [Pa].
     """
 
     time: float
@@ -105,6 +110,7 @@ class StepReport:
     velocity: Faces
     heat: Array | None = None
     budget: Budget | None = None
+    mean_pressure: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from greybed.cfd import _momentum, energy, forces
+from greybed.cfd import _momentum, energy, forces, sealed
 from greybed.cfd.boundaries import Sides, lead
 from greybed.cfd.fluid import Fluid
 from greybed.cfd.gas_state import Gas, Inputs, Tally
@@ -109,16 +109,15 @@ class Part:
             if not np.isfinite(u).all():
                 place = _place(grid, axis, int(np.argmin(np.isfinite(u))), u.shape)
                 raise TooLong(f"the velocity along {AXES[axis]} at {place} is not finite.")
-        temperature = s.temperature
+        temperature, mean = s.temperature, s.mean_pressure
         if given.heating is not None:
-            temperature, heat = energy.advance(
-                sides, self.fluid, s.temperature, mass - dt * growth, mass,
-                _products(faces, velocity), given.void, given.heating, dt,
-            )  # fmt: skip
+            temperature, heat, mean = self._temperatures(
+                s, mass - dt * growth, mass, _products(faces, velocity), given, given.heating, dt
+            )
             tally.heat = share * heat + (0.0 if tally.heat is None else tally.heat)
         new = Gas(
             velocity, s.pressure + p, given.void, mass, temperature, s.time + dt, gradient,
-            convection, friction, dt,
+            convection, friction, dt, mean_pressure=mean,
         )  # fmt: skip
         if self.budget:
             new = self._account(tally.budget, s, new, given, rate, flux, shares, (a, b))
@@ -190,17 +189,36 @@ class Part:
     def _masses(self, s: Gas, dt: float, given: Inputs, flux: Faces) -> tuple[Array, Array]:
         """Mass of gas per volume after the step and its rate.
 
-        That of an ideal gas is from temperatures that the last mass fluxes would bring about.
+        That of an ideal gas is from temperatures that the last mass fluxes would bring about; in
+        a sealed box it stays the same in all.
         """
         if self.fluid.molar_mass is None or given.heating is None:
             return self.fluid.density * given.void, self.fluid.density * given.rate
         after = s.mass - dt * forces.outflow(self.sides, flux)
-        t, _ = energy.advance(
-            self.sides, self.fluid, s.temperature, s.mass, after, flux, given.void, given.heating,
-            dt,
-        )  # fmt: skip
-        mass = given.void * self.fluid.density_at(t)
+        t, _, _ = self._temperatures(s, s.mass, after, flux, given, given.heating, dt)
+        if sealed.is_sealed(self.sides, self.fluid):
+            mass = sealed.masses(float(s.mass.sum()), given.void, t)
+        else:
+            mass = given.void * self.fluid.density_at(t)
         return mass, (mass - s.mass) / dt
+
+    def _temperatures(
+        self, s: Gas, old: Array, new: Array, flux: Faces, given: Inputs, heating: energy.Heating,
+        dt: float,
+    ) -> tuple[Array, Array, float]:  # fmt: skip
+        """Temperatures after a step, heat from particles and the mean pressure."""
+
+        def advance(work: Array | None) -> tuple[Array, Array]:
+            return energy.advance(
+                self.sides, self.fluid, s.temperature, old, new, flux, given.void, heating, dt, work
+            )
+
+        if not sealed.is_sealed(self.sides, self.fluid):
+            return *advance(None), s.mean_pressure
+        t, heat, mean = sealed.warmed(advance, new, given.void, s.mean_pressure, self.fluid, dt)
+        if not (t > 0.0).all():
+            raise TooLong(f"the temperature falls to {float(t.min()):.3g} K.")
+        return t, heat, mean
 
     def _shares(self, void: Array) -> Faces:
         """Share of the pressure's slope that the gas bears, on faces."""

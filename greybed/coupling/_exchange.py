@@ -47,6 +47,32 @@ def _in_turns(x, n, periodic):
 
 
 @njit(**_OPTIONS)
+def _steps(nx, ny):
+    """From a row to the next one, and to the one above, in the arrays of u, v and w."""
+    ru, rv, rw = nx + 3, nx + 2, nx + 2
+    return ru, rv, rw, ru * (ny + 2), rv * (ny + 3), rw * (ny + 2)
+
+
+@njit(inline="always", **_OPTIONS)
+def _around(x, y, z, nx, ny, nz, px, py, pz):
+    """Faces around a place, given in cells from the lower corner.
+
+    The lowest one in the arrays of u, v and w, what the place is beyond it along x, y and z among
+    faces, and the same among centres.
+    """
+    x, y, z = _in_turns(x, nx, px), _in_turns(y, ny, py), _in_turns(z, nz, pz)
+    # Points of an axis are faces for the velocity along it, centres for the others; all of an
+    # axis of one cell is at its centre.
+    (fi, fa), (fj, fb), (fk, fc) = _below(x), _below(y), _below(z)
+    i, a = _below(x - 0.5) if nx > 1 else (1, 0.0)
+    j, b = _below(y - 0.5) if ny > 1 else (1, 0.0)
+    k, c = _below(z - 0.5) if nz > 1 else (1, 0.0)
+    ru, rv, rw, uu, uv, uw = _steps(nx, ny)
+    au, av, aw = k * uu + j * ru + fi, k * uv + fj * rv + i, fk * uw + j * rw + i
+    return au, av, aw, fa, fb, fc, a, b, c
+
+
+@njit(**_OPTIONS)
 def _row(field, at, a):
     # Numbers without sign: others are taken to count from the end, which costs a look at each.
     m = np.uint64(at)
@@ -64,20 +90,10 @@ def read_faces(place, lower, spacing, cells, periodic, u, v, w, out):
     ox, oy, oz = 1.0 / spacing[0], 1.0 / spacing[1], 1.0 / spacing[2]
     nx, ny, nz = cells[0], cells[1], cells[2]
     px, py, pz = periodic[0], periodic[1], periodic[2]
-    # From a row to the next one, and to the one above, in each array.
-    ru, rv, rw = nx + 3, nx + 2, nx + 2
-    uu, uv, uw = ru * (ny + 2), rv * (ny + 3), rw * (ny + 2)
+    ru, rv, rw, uu, uv, uw = _steps(nx, ny)
     for p in range(place.shape[0]):
-        x = _in_turns((place[p, 0] - lower[0]) * ox, nx, px)
-        y = _in_turns((place[p, 1] - lower[1]) * oy, ny, py)
-        z = _in_turns((place[p, 2] - lower[2]) * oz, nz, pz)
-        # Points of an axis are faces for the velocity along it, centres for the others; all of an
-        # axis of one cell is at its centre.
-        (fi, fa), (fj, fb), (fk, fc) = _below(x), _below(y), _below(z)
-        i, a = _below(x - 0.5) if nx > 1 else (1, 0.0)
-        j, b = _below(y - 0.5) if ny > 1 else (1, 0.0)
-        k, c = _below(z - 0.5) if nz > 1 else (1, 0.0)
-        au, av, aw = k * uu + j * ru + fi, k * uv + fj * rv + i, fk * uw + j * rw + i
+        x, y, z = place[p, 0] - lower[0], place[p, 1] - lower[1], place[p, 2] - lower[2]
+        au, av, aw, fa, fb, fc, a, b, c = _around(x * ox, y * oy, z * oz, nx, ny, nz, px, py, pz)
         out[p, 1] = _pair(v, av, uv, a, c) * (1.0 - fb) + _pair(v, av + rv, uv, a, c) * fb
         if b == 0.0:  # all is in one row
             out[p, 0] = _pair(u, au, uu, fa, c)
@@ -113,19 +129,12 @@ def give_to_faces(place, lower, spacing, cells, periodic, k, target, u, v, w):
     nx, ny, nz = cells[0], cells[1], cells[2]
     px, py, pz = periodic[0], periodic[1], periodic[2]
     own = 1 if k.shape[1] == 3 else 0
-    ru, rv, rw = nx + 3, nx + 2, nx + 2
-    uu, uv, uw = ru * (ny + 2), rv * (ny + 3), rw * (ny + 2)
+    ru, rv, rw, uu, uv, uw = _steps(nx, ny)
     for p in range(place.shape[0]):
-        x = _in_turns((place[p, 0] - lower[0]) * ox, nx, px)
-        y = _in_turns((place[p, 1] - lower[1]) * oy, ny, py)
-        z = _in_turns((place[p, 2] - lower[2]) * oz, nz, pz)
-        (fi, fa), (fj, fb), (fk, fc) = _below(x), _below(y), _below(z)
-        i, a = _below(x - 0.5) if nx > 1 else (1, 0.0)
-        j, b = _below(y - 0.5) if ny > 1 else (1, 0.0)
-        m, c = _below(z - 0.5) if nz > 1 else (1, 0.0)
+        x, y, z = place[p, 0] - lower[0], place[p, 1] - lower[1], place[p, 2] - lower[2]
+        au, av, aw, fa, fb, fc, a, b, c = _around(x * ox, y * oy, z * oz, nx, ny, nz, px, py, pz)
         kx, ky, kz = k[p, 0], k[p, own], k[p, 2 * own]
         gx, gy, gz = kx * target[p, 0], ky * target[p, 1], kz * target[p, 2]
-        au, av, aw = m * uu + j * ru + fi, m * uv + fj * rv + i, fk * uw + j * rw + i
         _spread(u, au, uu, fa, c, 1.0 - b, kx, gx)
         _spread(v, av, uv, a, c, 1.0 - fb, ky, gy)
         _spread(w, aw, uw, a, fc, 1.0 - b, kz, gz)
@@ -152,18 +161,11 @@ def drag_both_ways(
     ox, oy, oz = 1.0 / spacing[0], 1.0 / spacing[1], 1.0 / spacing[2]
     nx, ny, nz = cells[0], cells[1], cells[2]
     px, py, pz = periodic[0], periodic[1], periodic[2]
-    ru, rv, rw = nx + 3, nx + 2, nx + 2
-    uu, uv, uw = ru * (ny + 2), rv * (ny + 3), rw * (ny + 2)
+    ru, rv, rw, uu, uv, uw = _steps(nx, ny)
     outside, bad, fastest = 0, -1, 0.0
     for p in range(place.shape[0]):
-        x = _in_turns((place[p, 0] - lower[0]) * ox, nx, px)
-        y = _in_turns((place[p, 1] - lower[1]) * oy, ny, py)
-        z = _in_turns((place[p, 2] - lower[2]) * oz, nz, pz)
-        (fi, fa), (fj, fb), (fk, fc) = _below(x), _below(y), _below(z)
-        i, a = _below(x - 0.5) if nx > 1 else (1, 0.0)
-        j, b = _below(y - 0.5) if ny > 1 else (1, 0.0)
-        m, c = _below(z - 0.5) if nz > 1 else (1, 0.0)
-        au, av, aw = m * uu + j * ru + fi, m * uv + fj * rv + i, fk * uw + j * rw + i
+        x, y, z = place[p, 0] - lower[0], place[p, 1] - lower[1], place[p, 2] - lower[2]
+        au, av, aw, fa, fb, fc, a, b, c = _around(x * ox, y * oy, z * oz, nx, ny, nz, px, py, pz)
         x = _pair(u, au, uu, fa, c)
         y = _pair(v, av, uv, a, c) * (1.0 - fb) + _pair(v, av + rv, uv, a, c) * fb
         z = _pair(w, aw, uw, a, fc)
@@ -217,18 +219,11 @@ def forces_of(
     ox, oy, oz = 1.0 / spacing[0], 1.0 / spacing[1], 1.0 / spacing[2]
     nx, ny, nz = cells[0], cells[1], cells[2]
     wx, wy, wz = periodic[0], periodic[1], periodic[2]
-    ru, rv, rw = nx + 3, nx + 2, nx + 2
-    uu, uv, uw = ru * (ny + 2), rv * (ny + 3), rw * (ny + 2)
+    ru, rv, rw, uu, uv, uw = _steps(nx, ny)
     fx = fy = fz = ax = ay = az = gx = gy = gz = 0.0
     for p in range(place.shape[0]):
-        x = _in_turns((place[p, 0] - lower[0]) * ox, nx, wx)
-        y = _in_turns((place[p, 1] - lower[1]) * oy, ny, wy)
-        z = _in_turns((place[p, 2] - lower[2]) * oz, nz, wz)
-        (fi, fa), (fj, fb), (fk, fc) = _below(x), _below(y), _below(z)
-        i, a = _below(x - 0.5) if nx > 1 else (1, 0.0)
-        j, b = _below(y - 0.5) if ny > 1 else (1, 0.0)
-        m, c = _below(z - 0.5) if nz > 1 else (1, 0.0)
-        au, av, aw = m * uu + j * ru + fi, m * uv + fj * rv + i, fk * uw + j * rw + i
+        x, y, z = place[p, 0] - lower[0], place[p, 1] - lower[1], place[p, 2] - lower[2]
+        au, av, aw, fa, fb, fc, a, b, c = _around(x * ox, y * oy, z * oz, nx, ny, nz, wx, wy, wz)
         x = _pair(u, au, uu, fa, c)
         y = _pair(v, av, uv, a, c) * (1.0 - fb) + _pair(v, av + rv, uv, a, c) * fb
         z = _pair(w, aw, uw, a, fc)

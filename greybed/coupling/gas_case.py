@@ -166,6 +166,8 @@ class GasRun:
                 row[f"pressure drop along {name} [Pa]"] = float(drop.mean())
         if self.case.warm:
             row["mean temperature [K]"] = float(s.temperature.mean())
+        if s.sealed:
+            row["mean pressure [Pa]"] = s.mean_pressure
         return row
 
     def fields(self) -> dict[str, Array]:
@@ -198,6 +200,7 @@ class GasRun:
                 row[f"mean superficial velocity {name} [m/s]"] for name in "xyz"
             ],
             **drops,
+            **({"mean_pressure_Pa": self.solver.mean_pressure} if self.solver.sealed else {}),
             "pressure_iterations": self.iterations,
             "largest_divergence": self.divergence,
         }

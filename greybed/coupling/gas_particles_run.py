@@ -188,6 +188,8 @@ class GasParticlesRun(ParticleRun):
             row["mean gas temperature [K]"] = float(self.gas.temperature.mean())
             # With what walls give through contacts, this is all that the particles gain.
             row |= {name: self.totals[name] for name in (_FROM_GAS, _LIGHT)}
+        if self.gas.sealed:
+            row["mean pressure [Pa]"] = self.gas.mean_pressure
         return row
 
     def _note(self) -> None:
@@ -227,7 +229,7 @@ class GasParticlesRun(ParticleRun):
                 **{
                     k: v
                     for k, v in self._gas_sample().items()
-                    if k.startswith(("pressure drop", "heat"))
+                    if k.startswith(("pressure drop", "heat", "mean pressure"))
                 },
             }
         }

@@ -129,8 +129,13 @@ def test_what_energy_needs_is_asked_for():
     with pytest.raises(InputError, match="temperature"):
         column(4, {"z-": Inflow(0.4), "z+": Outlet()})
     ideal = Fluid(molar_mass=0.029, viscosity=1.8e-5)
-    with pytest.raises(InputError, match="closed box"):
-        column(4, {}, ideal)
+    with pytest.raises(InputError, match="no side holds its mean pressure"):
+        column(4, {"z-": Inflow(0.4, 300.0), "z+": Inflow(-0.4, 300.0)}, ideal)
+    with pytest.raises(InputError, match="constant pressure"):
+        column(4, {}, Fluid(molar_mass=0.029, viscosity=1.8e-5, heat_capacity=280.0))
+    for first, then in (({}, Outlet()), ({"z+": Outlet()}, Wall())):
+        with pytest.raises(InputError, match="sealed or let out"):
+            column(4, first, ideal).set_boundary("z+", then)
     with pytest.raises(InputError, match="temperature at the start"):
         column(4, {"z+": Outlet()}, ideal, temperature=None)
     with pytest.raises(InputError, match="above 0"):

@@ -24,7 +24,7 @@ D = 1e-3
 
 
 def cloud(settings, *, model="A", gravity=(0.0, 0.0, 0.0), n=5, edge=2.2e-3, cells=(6, 5, 4),
-          temperature=None, heat=None, density=2500.0, **gas_options):  # fmt: skip
+          temperature=None, heat=None, density=2500.0, fluid=None, **gas_options):  # fmt: skip
     """Spheres on a loose lattice in a periodic box of gas, both with velocities."""
     rng = np.random.default_rng(0)
     at = np.stack(np.meshgrid(*[np.arange(n)] * 3, indexing="ij"), -1).reshape(-1, 3)
@@ -37,8 +37,8 @@ def cloud(settings, *, model="A", gravity=(0.0, 0.0, 0.0), n=5, edge=2.2e-3, cel
     )  # fmt: skip
     grid = Grid(cells=cells, upper=(size,) * 3, periodic=(True,) * 3)
     gas = GasSolver(
-        grid, {}, Fluid(**AIR), model=model, gravity=gravity, budget=True, temperature=temperature,
-        **gas_options,
+        grid, {}, fluid or Fluid(**AIR), model=model, gravity=gravity, budget=True,
+        temperature=temperature, **gas_options,
     )  # fmt: skip
     gas.set_velocity(0.3, -0.2, 0.5)
     warm = heat(sim) if heat else None
@@ -109,6 +109,36 @@ def test_heat_goes_from_gas_to_particles_and_none_is_lost():
     # the gas's own heat: what its continuity solver leaves
     assert abs(energy() - start) < 1e-9 * start
     assert gas.temperature.mean() > 300.0
+
+
+def test_an_ideal_gas_that_nothing_lets_out_keeps_mass_and_internal_energy():
+    def heat(sim):
+        t = np.where(np.arange(len(sim.centres)) % 2, 500.0, 350.0)
+        return GasHeat(Heat(sim, 1.0, 800.0, t), 0.026, 0.7)
+
+    ideal = Fluid(molar_mass=0.029, viscosity=1.8e-5, heat_capacity=1005.0, temperature=300.0)
+    both, _, gas = cloud(Settings(), temperature=300.0, heat=heat, fluid=ideal)
+    volume, warm = gas.grid.cell_volume, both.heat.heat
+    at_constant_volume = ideal.heat_capacity - ideal.gas_constant
+
+    def held():
+        return warm.capacities @ warm.temperatures
+
+    def content():
+        return at_constant_volume * float((gas.state.mass * gas.temperature).sum()) * volume
+
+    first, start, mass = held(), content(), gas.state.mass.sum()
+    for _ in range(20):
+        both.step(5)
+        assert both.heat.report.defect < 1e-11
+    gained = content() - start
+    assert gained > 1e-5
+    # To the round-off of what is held, which is far more than what is exchanged.
+    assert gained == pytest.approx(first - held(), rel=0.0, abs=1e-13 * first)
+    assert gas.state.mass.sum() == pytest.approx(mass, rel=1e-13)
+    room = float(gas.state.void_fraction.sum()) * volume
+    rise = gained * ideal.gas_constant / at_constant_volume / room
+    assert gas.mean_pressure - ideal.pressure == pytest.approx(rise, rel=1e-6)
 
 
 def test_gas_and_particles_come_to_one_temperature():
