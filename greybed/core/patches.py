@@ -85,7 +85,9 @@ def distances(walls: Sequence[Wall], points: Array) -> Array:
         Infinite where no wall is bounded [m].
     """
     distance = np.empty(len(points))
-    _kernels.patch_distances(np.ascontiguousarray(points), tables(walls), distance)
+    # Writable, for read-only points would have the kernel compiled once more.
+    points = np.require(points, np.float64, ["C", "W"])
+    _kernels.patch_distances(points, tables(walls), distance)
     return distance
 
 

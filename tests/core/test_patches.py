@@ -336,3 +336,13 @@ def test_distances_against_dense_points():
     each = np.min([tables.distances([w], points) for w in walls], axis=0)
     np.testing.assert_allclose(together, each, rtol=1e-14)
     assert np.isinf(tables.distances([Plane((0, 0, 0), (0, 0, 1))], points)).all()
+
+
+def test_points_that_are_read_only_need_no_machine_code_of_their_own():
+    walls = box_walls((-1, -1, 0), (1, 1, 1))
+    points = np.array([[0.1, 0.2, 0.5]])
+    writable = distances(walls, points)
+    known = list(_kernels.patch_distances.signatures)
+    points.setflags(write=False)
+    np.testing.assert_array_equal(distances(walls, points), writable)
+    assert list(_kernels.patch_distances.signatures) == known

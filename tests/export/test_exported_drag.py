@@ -7,7 +7,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from conftest import WARNINGS
+from exported_closures import WARNINGS
 
 from greybed.closures.drag import drag_law
 from greybed.closures.drag.filtered import MARKER_SETS, FilteredDragClosure, filtered_force

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import EVERY, FITTED, FLAGS, HARD, UNTRAINED
+from exported_closures import EVERY, FITTED, FLAGS, HARD, UNTRAINED
 
 from greybed.closures import ViewFactorClosure, content_hash, load, save
 from greybed.closures.predictors import Forest

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import onnx
 import pytest
-from conftest import FITTED, UNTRAINED
+from exported_closures import FITTED, UNTRAINED
 from onnx import TensorProto
 from onnx.reference import ReferenceEvaluator
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from conftest import FITTED
+from exported_closures import FITTED
 
 from greybed.closures.viewfactor.limits import random_markers
 from greybed.core.exact import quadrature

@@ -8,7 +8,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from conftest import WARNINGS
+from exported_closures import WARNINGS
 
 from greybed.closures import ViewFactorClosure, content_hash, golden_rows
 from greybed.closures.predictors import Network

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import WARNINGS
+from exported_closures import WARNINGS
 
 from greybed.closures import ViewFactorClosure
 from greybed.closures.predictors import Network

@@ -8,7 +8,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from conftest import FITTED
+from exported_closures import FITTED
 
 from greybed.closures import content_hash
 from greybed.closures.viewfactor.limits import random_markers

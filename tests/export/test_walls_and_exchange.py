@@ -7,7 +7,7 @@ import subprocess
 import numpy as np
 import onnx
 import pytest
-from conftest import OTHERS, SHIPPED, WARNINGS
+from exported_closures import OTHERS, SHIPPED, WARNINGS
 
 from greybed.closures import content_hash, load, save
 from greybed.closures.viewfactor.limits import check_limits, random_markers
