@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.integrate import trapezoid
 from scipy.special import ive
 
 from greybed.cfd.boundaries import Inflow, Outlet
@@ -30,7 +31,7 @@ def schumann(y, z):
     t = np.linspace(0.0, z, 4001)
     root = 2.0 * np.sqrt(y * t)
     integrand = np.exp(-y - t + root) * ive(0, root)
-    return float(np.trapezoid(integrand, t))
+    return float(trapezoid(integrand, t))
 
 
 def errors_of_a_heated_bed(wide):

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from greybed.core.errors import InputError
 from greybed.core.walls import Mesh, Plane
@@ -46,7 +47,7 @@ def test_union_of_two_overlapping_spheres_has_the_volume_and_inertia_of_the_lens
     # About the axis: balls less twice the cap's own moment, by quadrature of its discs.
     x = np.linspace(r - height, r, 20001)
     disc = math.pi / 2 * (r**2 - x**2) ** 2
-    twice = 2 * np.trapezoid(disc, x)
+    twice = 2 * trapezoid(disc, x)
     along = 2 * (8 / 15 * math.pi * r**5) - twice
     assert np.sort(clump.moments)[0] == pytest.approx(along, rel=1e-4)
     assert clump.centres.mean(axis=0) == pytest.approx([0, 0, 0], abs=1e-9)
