@@ -301,7 +301,8 @@ class Lists:
             ),
         )  # fmt: skip
         into, slots = np.empty(n + 1, np.int64), np.empty(found, np.int32)
-        # A particle is a part of the work of its pairs. Those of the first blocks own more of them.
+        # A particle counts as much as a listed pair: those of the first blocks own more pairs, and
+        # blocks of equal numbers of particles would have one thread wait for another.
         block = _even(first + np.arange(n + 1), len(near.block) - 1)
         crossings = _neighbours.list_crossings(block, first, partner, slot, into, slots)
         owner = np.repeat(np.arange(n, dtype=np.int32), np.diff(first))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from threading import Thread
+
 import numpy as np
 import pytest
 from impacts import GLASS, on_floor, pair
 
 from greybed.core import Cone, Cylinder, Disc, InputError, Mesh, Plane, box_walls
-from greybed.dem import Contact, ContactLaw, Material, Simulation, SolidWall
+from greybed.dem import Contact, ContactLaw, Material, Simulation, SolidWall, crew, lists
 from greybed.dem.checkpoint import restore, save
 
 R = 1e-3
@@ -124,6 +126,22 @@ def test_same_bits_on_any_threads_and_in_any_parts(periodic):
         assert len(sim.contacts) > 300
         ends.append((sim.centres.tobytes(), sim.spins.tobytes(), sim.time))
     assert ends[0] == ends[1] == ends[2]
+
+
+def test_blocks_of_helpers_that_never_come_are_done_all_the_same(monkeypatch):
+    class Late(Thread):
+        def start(self):
+            pass
+
+    monkeypatch.setattr(lists, "BLOCK", 64)
+    rows = []
+    for threads, helper in ((1, Thread), (2, Thread), (2, Late)):
+        monkeypatch.setattr(crew, "Thread", helper)
+        sim = gas(9, threads=threads)
+        sim.run(60)
+        rows.append(np.concatenate([sim.centres, sim.velocities, sim.spins]))
+    np.testing.assert_array_equal(rows[1], rows[0])
+    np.testing.assert_array_equal(rows[2], rows[0])
 
 
 def test_lists_find_every_contact_and_keep_springs():
